@@ -1,0 +1,16 @@
+//! Vocabulary shared by every layer: what a frame is, where a camera stood, and the rasters that pass between stages.
+//!
+//! Nothing here does I/O or knows a device, a network or a plant. Units are SI, angles radians, camera axes OpenCV's
+//! (x right, y down, z forward), the world right-handed with z up.
+
+mod camera;
+mod frame;
+mod pose;
+mod raster;
+mod stamp;
+
+pub use camera::{CameraError, Intrinsics, Pinhole};
+pub use frame::{CameraId, Frame, PixelFormat};
+pub use pose::Pose;
+pub use raster::{Depth, Instances, Mask, Rgb, Semantic};
+pub use stamp::Stamp;

@@ -1,0 +1,2 @@
+//! The `demeter` program.
+fn main() {}

@@ -1,0 +1,1 @@
+//! The Demeter plant model and everything geometric.
