@@ -1,0 +1,103 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::ModelError;
+
+/// What a model's inputs and outputs mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Layout {
+    /// Our network for organs, boundary distance and depth: see [`crate::Organ2d`].
+    Organ2d,
+}
+
+/// One input or output.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Port {
+    /// Its name in the graph.
+    pub name: String,
+    /// Its shape; -1 for a dimension that the caller chooses.
+    pub shape: Vec<i64>,
+    /// Its element type as ONNX Runtime spells it here: `f32`, `i64`.
+    pub dtype: String,
+}
+
+impl std::fmt::Display for Port {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}{:?}", self.name, self.dtype, self.shape)
+    }
+}
+
+/// One data set that a model learned from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataSet {
+    /// Images in it.
+    pub images: u64,
+    /// Seed it was made with.
+    pub seed: u64,
+    /// Program that made it, with its version.
+    pub program: String,
+    /// Over its files, in the order of their names.
+    pub sha256: String,
+}
+
+/// How a model came to be, so that anyone can make it again and judge it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// The command that trained it.
+    pub command: String,
+    /// The seed of weights, order and augmentation.
+    pub seed: u64,
+    /// Optimiser steps, all runs together.
+    pub steps: u64,
+    /// What trained it, with versions.
+    pub program: String,
+    /// What it was trained on.
+    pub data: Vec<DataSet>,
+    /// Measured on held-out images, by name.
+    pub figures: BTreeMap<String, f64>,
+}
+
+/// What is known of the model file beside it: `NAME.toml` describes `NAME.onnx`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// The model's name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// What its inputs and outputs mean.
+    pub layout: Layout,
+    /// Of the model file, lower-case hexadecimal.
+    pub sha256: String,
+    /// What the caller must do to the input's numbers; for people.
+    pub normalisation: String,
+    /// Inputs in the graph's order.
+    pub inputs: Vec<Port>,
+    /// Outputs in the graph's order.
+    pub outputs: Vec<Port>,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+impl Manifest {
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    /// [`ModelError::Io`] and [`ModelError::Manifest`], which names the key.
+    pub fn read(path: &Path) -> Result<Self, ModelError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Io { path: path.into(), source })?;
+        toml::from_str(&text).map_err(|source| ModelError::Manifest { path: path.into(), source: Box::new(source) })
+    }
+
+    /// The model file that the manifest at `path` describes.
+    #[must_use]
+    pub fn model_path(path: &Path) -> PathBuf {
+        path.with_extension("onnx")
+    }
+}

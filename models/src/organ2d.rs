@@ -1,0 +1,199 @@
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use demeter_frame::{Depth, Mask, Rgb, Semantic};
+use image::imageops::{FilterType, resize};
+use image::{GrayImage, ImageBuffer, Luma};
+use ndarray::{Array4, ArrayView2, Axis, s};
+
+use crate::model::ports;
+use crate::{Layout, Model, ModelError, Port, Runtime};
+
+/// The network halves its input four times, so sides are multiples of this many pixels.
+const MULTIPLE: u32 = 16;
+/// Time and memory grow with the square of the side; 2048 is beyond any use we know (a guess).
+const MAX_LONG_SIDE: u32 = 2048;
+
+/// What the network sees in one image, at its working size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OrganMaps {
+    /// Probability of each class, in the order of [`Semantic::ALL`]; they sum to 1 at every pixel.
+    pub probabilities: [Mask; 4],
+    /// Truncated inverse distance to the nearest pixel of another organ, 0 (far) to 1 (touching); it means something
+    /// on organs only.
+    pub dist: Mask,
+    /// Natural logarithm of depth along the camera's axis, up to one additive constant for the image.
+    pub log_depth: Depth,
+    /// Pixels of the original image per pixel of these maps, along x and y: continuous coordinates are multiplied.
+    pub scale: [f64; 2],
+}
+
+impl OrganMaps {
+    /// The likeliest class of each pixel, as the number of its [`Semantic`].
+    #[must_use]
+    pub fn semantic(&self) -> GrayImage {
+        let (width, height) = self.dist.dimensions();
+        GrayImage::from_fn(width, height, |x, y| {
+            let p = self.probabilities.each_ref().map(|class| class.get_pixel(x, y).0[0]);
+            let best = Semantic::ALL.into_iter().max_by(|&a, &b| p[a as usize].total_cmp(&p[b as usize]));
+            Luma([best.unwrap_or(Semantic::Background) as u8])
+        })
+    }
+}
+
+/// Our network for organs and depth: a residual U-Net trained by models/training/train_organ2d.py.
+///
+/// The graph takes `image` f32 `[n, 3, h, w]`, RGB in 0..=1 with sides that are multiples of 16, and gives the logits
+/// `sem` `[n, 4, h, w]`, `dist` `[n, 1, h, w]` in 0..=1 and `depth` `[n, 1, h, w]`, log depth up to a constant
+/// (spec/models.md, "Our networks").
+#[derive(Debug)]
+pub struct Organ2d {
+    model: Model,
+    long_side: u32,
+}
+
+impl Organ2d {
+    /// The default long side of the working size, pixels: 40 ms a call on one core (spec/models.md).
+    pub const LONG_SIDE: u32 = 384;
+
+    /// Opens the network that the manifest at `path` describes (see [`crate::find_manifest`]), on `threads` threads.
+    ///
+    /// # Errors
+    /// Those of [`Model::open`], and [`ModelError::Ports`] when the manifest describes another kind of network.
+    pub fn open(runtime: &Runtime, path: &Path, threads: NonZeroUsize) -> Result<Self, ModelError> {
+        let model = Model::open(runtime, path, threads)?;
+        let manifest = model.manifest();
+        let Layout::Organ2d = manifest.layout;
+        for (expected, found) in [(signature(&[("image", 3)]), &manifest.inputs), (outputs(), &manifest.outputs)] {
+            if &expected != found {
+                let (expected, found) = (ports(&expected), ports(found));
+                return Err(ModelError::Ports { name: manifest.name.clone(), expected, found });
+            }
+        }
+        Ok(Self { model, long_side: Self::LONG_SIDE })
+    }
+
+    /// The same network working at another long side, in pixels.
+    ///
+    /// # Errors
+    /// [`ModelError::LongSide`] unless it is a multiple of 16 from 16 to 2048.
+    pub fn with_long_side(self, long_side: u32) -> Result<Self, ModelError> {
+        if long_side == 0 || long_side > MAX_LONG_SIDE || !long_side.is_multiple_of(MULTIPLE) {
+            return Err(ModelError::LongSide { found: long_side });
+        }
+        Ok(Self { long_side, ..self })
+    }
+
+    /// The verified model.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Runs the network on an image of any size; the maps come at the working size.
+    ///
+    /// # Errors
+    /// [`ModelError::EmptyImage`], [`ModelError::Shape`], and those of [`Model::run`].
+    pub fn run(&mut self, image: &Rgb) -> Result<OrganMaps, ModelError> {
+        let (width, height) = image.dimensions();
+        if width == 0 || height == 0 {
+            return Err(ModelError::EmptyImage { width, height });
+        }
+        let (w, h) = working_size(width, height, self.long_side);
+        let found = self.model.run(tensor(image, w, h).view())?;
+        for (output, port) in found.iter().zip(outputs()) {
+            let expected = vec![1, port.shape[1] as usize, h as usize, w as usize];
+            if output.shape() != expected {
+                let (name, found) = (self.model.manifest().name.clone(), output.shape().to_vec());
+                return Err(ModelError::Shape { name, output: port.name, expected, found });
+            }
+        }
+        let mut sem = found[0].slice(s![0, .., .., ..]).to_owned();
+        for mut pixel in sem.lanes_mut(Axis(0)) {
+            let largest = pixel.fold(f32::NEG_INFINITY, |a, &b| a.max(b));
+            pixel.mapv_inplace(|logit| (logit - largest).exp());
+            let sum = pixel.sum();
+            pixel.mapv_inplace(|p| p / sum);
+        }
+        Ok(OrganMaps {
+            probabilities: Semantic::ALL.map(|class| raster(sem.index_axis(Axis(0), class as usize))),
+            dist: raster(found[1].slice(s![0, 0, .., ..])),
+            log_depth: raster(found[2].slice(s![0, 0, .., ..])),
+            scale: [f64::from(width) / f64::from(w), f64::from(height) / f64::from(h)],
+        })
+    }
+}
+
+fn signature(ports: &[(&str, i64)]) -> Vec<Port> {
+    let port = |&(name, channels): &(&str, i64)| Port {
+        name: name.to_owned(),
+        shape: vec![-1, channels, -1, -1],
+        dtype: "f32".to_owned(),
+    };
+    ports.iter().map(port).collect()
+}
+
+fn outputs() -> Vec<Port> {
+    signature(&[("sem", Semantic::ALL.len() as i64), ("dist", 1), ("depth", 1)])
+}
+
+/// The size nearest the image's proportions whose long side is `long_side` and whose sides are multiples of 16.
+fn working_size(width: u32, height: u32, long_side: u32) -> (u32, u32) {
+    let scale = f64::from(long_side) / f64::from(width.max(height));
+    let side = |pixels: u32| {
+        let multiples = (f64::from(pixels) * scale / f64::from(MULTIPLE)).round() as u32;
+        multiples.clamp(1, long_side / MULTIPLE) * MULTIPLE
+    };
+    (side(width), side(height))
+}
+
+/// The image as `[1, 3, h, w]` in 0..=1. The triangle filter is bilinear when it enlarges; when it shrinks it widens
+/// with the step, so that every pixel of the original counts as in an area mean.
+fn tensor(image: &Rgb, w: u32, h: u32) -> Array4<f32> {
+    let resized;
+    let image = if image.dimensions() == (w, h) {
+        image
+    } else {
+        resized = resize(image, w, h, FilterType::Triangle);
+        &resized
+    };
+    let raw = image.as_raw();
+    Array4::from_shape_fn((1, 3, h as usize, w as usize), |(_, c, y, x)| {
+        f32::from(raw[(y * w as usize + x) * 3 + c]) / 255.0
+    })
+}
+
+fn raster(values: ArrayView2<'_, f32>) -> ImageBuffer<Luma<f32>, Vec<f32>> {
+    let (height, width) = values.dim();
+    ImageBuffer::from_fn(width as u32, height as u32, |x, y| Luma([values[[y as usize, x as usize]]]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn working_sizes_are_multiples_of_16_near_the_proportions() {
+        assert_eq!(working_size(640, 480, 384), (384, 288));
+        assert_eq!(working_size(480, 640, 384), (288, 384));
+        assert_eq!(working_size(1, 1, 384), (384, 384));
+        assert_eq!(working_size(16_384, 1, 384), (384, 16));
+        for (width, height) in [(641, 479), (1920, 1080), (333, 1000), (17, 5)] {
+            let (w, h) = working_size(width, height, 512);
+            assert!(w % 16 == 0 && h % 16 == 0 && w.max(h) == 512, "{w} x {h}");
+            let exact = f64::from(width.min(height)) / f64::from(width.max(height)) * 512.0;
+            assert!((f64::from(w.min(h)) - exact).abs() <= 8.0, "{w} x {h}");
+        }
+    }
+
+    #[test]
+    fn a_tensor_keeps_channels_and_means() {
+        let image = Rgb::from_fn(128, 64, |x, y| image::Rgb([(x * 2 % 256) as u8, 100, (y * 4 % 256) as u8]));
+        let tensor = tensor(&image, 64, 32);
+        assert_eq!(tensor.shape(), [1, 3, 32, 64]);
+        let mean = |channel: usize| tensor.index_axis(Axis(1), channel).mean().unwrap() * 255.0;
+        for (channel, expected) in [(0, 127.0), (1, 100.0), (2, 126.0)] {
+            assert!((mean(channel) - expected).abs() < 1.0, "channel {channel}: {}", mean(channel));
+        }
+    }
+}
