@@ -12,3 +12,11 @@ pub struct PointCloud {
     /// Organ labels, one a point, when the source has them: 0 = stems, 1.. = one leaf node each.
     pub labels: Option<Vec<i32>>,
 }
+
+/// Diagonal of the points' axis-aligned bounding box in metres, `None` without points.
+#[must_use]
+pub fn diagonal(points: &[DVec3]) -> Option<f64> {
+    let low = points.iter().copied().reduce(DVec3::min)?;
+    let high = points.iter().copied().reduce(DVec3::max)?;
+    Some(low.distance(high))
+}
