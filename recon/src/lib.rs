@@ -4,6 +4,8 @@
 //! gives the same bytes everywhere. Start with [`model::plant`].
 
 pub mod cloud;
+pub mod export;
+pub mod import;
 pub mod metrics;
 pub mod model;
 pub mod nearest;
