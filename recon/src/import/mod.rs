@@ -1,5 +1,0 @@
-//! Files of others, read from bytes.
-
-mod ply;
-
-pub use ply::{MAX_POINTS, PlyError};
