@@ -12,7 +12,7 @@ use crate::model::stem::{self, BONES, StemModel};
 use crate::model::{Basis, Habit, Range, Ranges, Species, species::SpeciesError};
 
 /// Names of the species that ship.
-pub const NAMES: [&str; 2] = ["soybean", "maize"];
+pub const NAMES: [&str; 5] = ["soybean", "maize", "sorghum", "tobacco", "tomato"];
 
 /// A shipped species by name, `None` when there is none of that name.
 ///
@@ -21,7 +21,10 @@ pub const NAMES: [&str; 2] = ["soybean", "maize"];
 pub fn shipped(name: &str) -> Option<Result<Species, SpeciesError>> {
     match name {
         "soybean" => Some(soybean()),
-        "maize" => Some(maize()),
+        "maize" => Some(grass("maize", 0.042, 0.03)),
+        "sorghum" => Some(grass("sorghum", 0.035, 0.02)),
+        "tobacco" => Some(broadleaf("tobacco", Habit::Simple, 0.28)),
+        "tomato" => Some(broadleaf("tomato", Habit::Compound, 0.26)),
         _ => None,
     }
 }
@@ -36,23 +39,40 @@ fn soybean() -> Result<Species, SpeciesError> {
         stem_radius: Range::new(0.0003, 0.02),
         blade_width: Range::new(1.0, 1.0),
     };
-    // Ovate: widest at 0.4 of the length, about 0.62 as wide as long (a guess from the scans' look, learned in B).
-    let half_width = |v: f64| 0.31 * (v.powf(0.62) * (1.0 - v).powf(0.93)) / 0.5 * 1.04;
-    Species::new("soybean", Habit::Compound, ranges, PROVENANCE, &leaf(half_width, 1.0)?, &stem()?)
+    // 0.62 as wide as long (a guess from the scans' look, learned in B).
+    Species::new("soybean", Habit::Compound, ranges, PROVENANCE, &leaf(|v| ovate(0.31, v), 1.0)?, &stem()?)
 }
 
-/// Maize: strap leaves straight from the main stem.
-fn maize() -> Result<Species, SpeciesError> {
-    // Blades to 1.2 m long and 12 cm wide, plants to 3 m (Kiesselbach, The Structure and Reproduction of Corn, 1949).
+/// A grass: strap leaves straight from the main stem. `half_width` is that of a blade in blade lengths at s_x = 1,
+/// `stem_radius` the thickest stem's in metres.
+fn grass(name: &str, half_width: f64, stem_radius: f64) -> Result<Species, SpeciesError> {
+    // Maize blades to 1.2 m long and 12 cm wide, plants to 3 m (Kiesselbach, The Structure and Reproduction of Corn,
+    // 1949); sorghum a little narrower. Seedlings' first leaves are spoons, hence the wide end of s_x (a guess).
     let ranges = Ranges {
-        blade_length: Range::new(0.01, 1.5),
+        blade_length: Range::new(0.005, 1.5),
         stem_length: Range::new(0.003, 4.0),
-        stem_radius: Range::new(0.0005, 0.03),
-        blade_width: Range::new(0.3, 3.0),
+        stem_radius: Range::new(0.0003, stem_radius),
+        blade_width: Range::new(0.3, 8.0),
     };
-    // Nearly parallel edges that narrow to the tip; 1 : 12 at s_x = 1.
-    let half_width = |v: f64| 0.042 * (1.0 - (1.0 - v).powi(12)).max(0.0).sqrt() * (1.0 - v.powi(3)).powf(0.8);
-    Species::new("maize", Habit::Grass, ranges, PROVENANCE, &leaf(half_width, 1.6)?, &stem()?)
+    // Nearly parallel edges that narrow to the tip.
+    let outline = |v: f64| half_width * (1.0 - (1.0 - v).powi(12)).max(0.0).sqrt() * (1.0 - v.powi(3)).powf(0.8);
+    Species::new(name, Habit::Grass, ranges, PROVENANCE, &leaf(outline, 1.6)?, &stem()?)
+}
+
+/// A broad-leaved species with ovate blades whose half width is `half_width` blade lengths (a guess for each).
+fn broadleaf(name: &str, habit: Habit, half_width: f64) -> Result<Species, SpeciesError> {
+    let ranges = Ranges {
+        blade_length: Range::new(0.003, 0.6),
+        stem_length: Range::new(0.002, 2.5),
+        stem_radius: Range::new(0.0003, 0.03),
+        blade_width: Range::new(1.0, 1.0),
+    };
+    Species::new(name, habit, ranges, PROVENANCE, &leaf(|v| ovate(half_width, v), 1.0)?, &stem()?)
+}
+
+/// Half width at v of an ovate leaf that is widest (`half_width`) at 0.4 of its length.
+fn ovate(half_width: f64, v: f64) -> f64 {
+    half_width * (v / 0.4).powf(0.62) * ((1.0 - v) / 0.6).powf(0.93)
 }
 
 const PROVENANCE: &str = "analytic modes written by hand (recon/src/species.rs); learned from no data";

@@ -1,0 +1,93 @@
+//! Damped Gauss-Newton (Levenberg-Marquardt) on normal equations that the caller accumulates.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Normal equations of a weighted least-squares problem at one state.
+#[derive(Clone, Debug)]
+pub(super) struct Normal {
+    pub h: DMatrix<f64>,
+    pub g: DVector<f64>,
+    pub cost: f64,
+}
+
+impl Normal {
+    pub(super) fn new(parameters: usize) -> Self {
+        Self { h: DMatrix::zeros(parameters, parameters), g: DVector::zeros(parameters), cost: 0.0 }
+    }
+
+    /// Adds `weight * residual²` with its gradient row; only the upper triangle is kept up.
+    pub(super) fn add(&mut self, residual: f64, row: &[f64], weight: f64) {
+        self.cost += weight * residual * residual;
+        for (j, rj) in row.iter().enumerate() {
+            let scaled = weight * rj;
+            self.g[j] += scaled * residual;
+            let mut column = self.h.column_mut(j);
+            for (i, ri) in row[..=j].iter().enumerate() {
+                column[i] += scaled * ri;
+            }
+        }
+    }
+
+    /// Adds a pull of parameter `i` (now `value`) towards 0.
+    pub(super) fn prior(&mut self, i: usize, value: f64, weight: f64) {
+        self.cost += weight * value * value;
+        self.g[i] += weight * value;
+        self.h[(i, i)] += weight;
+    }
+
+    /// The step that minimises the damped quadratic model, `None` when it has none.
+    fn step(&self, damping: f64) -> Option<DVector<f64>> {
+        let mut h = self.h.clone();
+        h.fill_lower_triangle_with_upper_triangle();
+        for i in 0..h.nrows() {
+            h[(i, i)] += damping * h[(i, i)] + 1e-12;
+        }
+        let step = h.cholesky()?.solve(&-&self.g);
+        step.iter().all(|x| x.is_finite()).then_some(step)
+    }
+}
+
+/// How a minimisation ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ended {
+    pub cost: f64,
+    /// The cost stopped falling before the iterations ran out.
+    pub converged: bool,
+}
+
+/// Minimises from `state`; `normal` linearises (and finds correspondences anew), `apply` takes a step inside the
+/// model. A step is kept only when the newly matched cost falls.
+pub(super) fn minimise<S: Clone>(
+    state: &mut S,
+    iterations: usize,
+    normal: impl Fn(&S) -> Normal,
+    apply: impl Fn(&S, &DVector<f64>) -> S,
+) -> Ended {
+    // Relative fall of the cost below which a fit has converged.
+    const TOLERANCE: f64 = 1e-4;
+    let mut damping = 1e-2;
+    let mut at = normal(state);
+    for _ in 0..iterations {
+        let Some(step) = at.step(damping) else {
+            damping *= 10.0;
+            continue;
+        };
+        let candidate = apply(state, &step);
+        let there = normal(&candidate);
+        if there.cost.is_finite() && there.cost < at.cost {
+            let fall = (at.cost - there.cost) / at.cost.max(f64::MIN_POSITIVE);
+            *state = candidate;
+            at = there;
+            damping = (damping * 0.3).max(1e-6);
+            if fall < TOLERANCE {
+                return Ended { cost: at.cost, converged: true };
+            }
+        } else {
+            damping *= 6.0;
+            if damping > 1e6 {
+                return Ended { cost: at.cost, converged: true };
+            }
+        }
+    }
+    Ended { cost: at.cost, converged: false }
+}

@@ -1,0 +1,98 @@
+//! Broad-leaved plants without labels: flat neighbourhoods are leaves, elongated ones stems; leaves grow along
+//! agreeing normals, stems are taken apart along their skeleton.
+
+use glam::DVec3;
+use nalgebra::Matrix3;
+
+use super::{MIN_ORGAN_POINTS, grain, ground_point, organ, split_stems};
+use crate::graph::pieces;
+use crate::model::OrganKind;
+use crate::nearest::Nearest;
+use crate::organs::OrganCloud;
+
+/// Radius of the neighbourhoods that are judged, as a share of the bounding box diagonal: wider than stems are
+/// thick, narrower than leaves are wide (a guess from soybean, tomato and tobacco).
+const SCALE_SHARE: f64 = 0.025;
+/// Second over first standard deviation of a neighbourhood below which it is a stem.
+const STEM_FLATNESS: f64 = 0.42;
+/// Cosine of the largest angle between neighbouring normals of one leaf (35°).
+const SAME_LEAF_COSINE: f64 = 0.82;
+/// Neighbours whose votes smooth the classes.
+const VOTERS: usize = 15;
+
+pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
+    let search = Nearest::of(points);
+    let grain = grain(points, &search);
+    let radius = (SCALE_SHARE * crate::cloud::diagonal(points).unwrap_or(0.0)).max(2.0 * grain);
+    let shapes: Vec<(f64, DVec3)> = points.iter().map(|p| neighbourhood(points, &search, *p, radius)).collect();
+    let mut is_stem: Vec<bool> = shapes.iter().map(|(flatness, _)| *flatness < STEM_FLATNESS).collect();
+    let near: Vec<Vec<usize>> =
+        points.iter().map(|p| search.k(*p, VOTERS).into_iter().map(|n| n.index).collect()).collect();
+    for _ in 0..2 {
+        is_stem = near.iter().map(|n| 2 * n.iter().filter(|j| is_stem[**j]).count() > n.len()).collect();
+    }
+    let base = ground_point(points, up);
+    // The foot is a stem whatever it looks like.
+    for n in search.within(points[base], radius) {
+        is_stem[n.index] = true;
+    }
+    let shapes = &shapes;
+    let joined = |i: usize| {
+        near[i].iter().copied().filter(move |j| {
+            points[i].distance(points[*j]) < 2.5 * grain && shapes[i].1.dot(shapes[*j].1).abs() > SAME_LEAF_COSINE
+        })
+    };
+    let clusters = pieces(points.len(), joined, |i| !is_stem[i]);
+    let least = MIN_ORGAN_POINTS.max(points.len() / 400);
+    let (leaves, crumbs): (Vec<_>, Vec<_>) = clusters.into_iter().partition(|c| c.len() >= least);
+    let stems: Vec<usize> = (0..points.len()).filter(|i| is_stem[*i]).collect();
+    let (leaves, stems) = adopt(points, leaves, stems, crumbs.concat());
+    let mut organs = split_stems(points, &stems, up);
+    organs.extend(leaves.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
+    organs
+}
+
+/// Second over first standard deviation of the points about `p`, and the normal of their plane.
+fn neighbourhood(points: &[DVec3], search: &Nearest, p: DVec3, radius: f64) -> (f64, DVec3) {
+    let mut found = search.within(p, radius);
+    if found.len() < 8 {
+        found = search.k(p, 8);
+    }
+    let n = found.len().max(1) as f64;
+    let centre = found.iter().map(|f| points[f.index]).sum::<DVec3>() / n;
+    let mut spread = Matrix3::zeros();
+    for f in &found {
+        let d = points[f.index] - centre;
+        let v = nalgebra::Vector3::new(d.x, d.y, d.z);
+        spread += v * v.transpose() / n;
+    }
+    let eigen = spread.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    let sd = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
+    let normal = eigen.eigenvectors.column(order[2]);
+    (sd[1] / sd[0].max(1e-12), DVec3::new(normal[0], normal[1], normal[2]))
+}
+
+/// Gives each crumb's points to the nearest leaf or stem.
+fn adopt(
+    points: &[DVec3],
+    mut leaves: Vec<Vec<usize>>,
+    mut stems: Vec<usize>,
+    crumbs: Vec<usize>,
+) -> (Vec<Vec<usize>>, Vec<usize>) {
+    let owners: Vec<(usize, usize)> = leaves
+        .iter()
+        .enumerate()
+        .flat_map(|(k, m)| m.iter().map(move |i| (*i, k)))
+        .chain(stems.iter().map(|i| (*i, usize::MAX)))
+        .collect();
+    let search = Nearest::of(&owners.iter().map(|(i, _)| points[*i]).collect::<Vec<_>>());
+    for i in crumbs {
+        match search.one(points[i]).map(|n| owners[n.index].1) {
+            Some(k) if k < leaves.len() => leaves[k].push(i),
+            _ => stems.push(i),
+        }
+    }
+    (leaves, stems)
+}

@@ -1,0 +1,138 @@
+//! Clouds to organs (spec/reconstruction.md "Points to organs"): by labels where there are any, else by geometry.
+
+mod broadleaf;
+mod grass;
+mod labelled;
+mod up;
+
+use glam::DVec3;
+
+use crate::cloud::{PointCloud, diagonal};
+use crate::fit::median_of;
+use crate::graph::CloudGraph;
+use crate::model::{Habit, OrganKind};
+use crate::nearest::Nearest;
+use crate::organs::OrganCloud;
+pub use up::Up;
+
+/// Where organ labels come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Labels {
+    /// The cloud's own when it has them, else geometry.
+    #[default]
+    Auto,
+    /// The cloud's own; it must have them.
+    Own,
+    /// Geometry, whatever the cloud says.
+    None,
+}
+
+/// Why a cloud cannot be divided.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum SegmentError {
+    /// Too few points for any plant.
+    #[error("cloud: expected at least {expected} points, found {found}")]
+    Points {
+        /// The least number.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// Points that all coincide, or are not finite.
+    #[error("cloud: expected finite points with an extent, found a bounding box diagonal of {found_metres} m")]
+    Extent {
+        /// The diagonal.
+        found_metres: f64,
+    },
+    /// Labels were asked for and are not there.
+    #[error("cloud: expected a `label` property with 0 for stems and 1.. for leaves, found {found}")]
+    Labels {
+        /// What is there.
+        found: &'static str,
+    },
+}
+
+/// Fewest points of a cloud that may be a plant.
+const MIN_POINTS: usize = 50;
+/// Fewest points of an organ; smaller clusters go to their neighbour.
+const MIN_ORGAN_POINTS: usize = 12;
+
+/// A cloud divided into organs, with the vertical that was found or given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segmented {
+    /// Exactly one main stem, then stems and leaves.
+    pub organs: Vec<OrganCloud>,
+    /// Unit vertical in the cloud's frame.
+    pub up: DVec3,
+}
+
+/// Divides a cloud into organs.
+///
+/// # Errors
+/// [`SegmentError`] when the cloud is too small, not finite, or lacks labels that were asked for.
+pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Result<Segmented, SegmentError> {
+    let found = cloud.points.len();
+    if found < MIN_POINTS {
+        return Err(SegmentError::Points { expected: MIN_POINTS, found });
+    }
+    let found_metres =
+        if cloud.points.iter().all(|p| p.is_finite()) { diagonal(&cloud.points).unwrap_or(0.0) } else { f64::NAN };
+    if !(found_metres.is_finite() && found_metres > 1e-3) {
+        return Err(SegmentError::Extent { found_metres });
+    }
+    let own = match (labels, &cloud.labels) {
+        (Labels::None, _) | (Labels::Auto, None) => None,
+        (Labels::Own, None) => return Err(SegmentError::Labels { found: "none" }),
+        (_, Some(own)) => Some(own),
+    };
+    match own {
+        Some(own) => labelled::segment(&cloud.points, own, up),
+        None => {
+            let up = up.resolve(&cloud.points, None);
+            let organs = match habit {
+                Habit::Grass => grass::segment(&cloud.points, up),
+                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, up),
+            };
+            Ok(Segmented { organs, up })
+        }
+    }
+}
+
+/// The points with these indices as an organ.
+fn organ(points: &[DVec3], kind: OrganKind, mut members: Vec<usize>) -> OrganCloud {
+    members.sort_unstable();
+    OrganCloud {
+        kind,
+        points: members.iter().map(|i| points[*i]).collect(),
+        source: members.into_iter().map(|i| i as u32).collect(),
+    }
+}
+
+/// Mean distance to the tenth neighbour (its median over a sample): the cloud's grain, metres.
+fn grain(points: &[DVec3], search: &Nearest) -> f64 {
+    let stride = points.len().div_ceil(2_000).max(1);
+    let gaps = points.iter().step_by(stride).filter_map(|p| search.k(*p, 11).last().map(|n| n.distance())).collect();
+    median_of(gaps).unwrap_or(0.0).max(1e-6)
+}
+
+/// The point where a plant meets the ground: the lowest one.
+fn ground_point(points: &[DVec3], up: DVec3) -> usize {
+    (0..points.len()).fold(0, |low, i| if points[i].dot(up) < points[low].dot(up) { i } else { low })
+}
+
+/// Divides stem points into the main stem and its branches along their skeleton.
+fn split_stems(points: &[DVec3], members: &[usize], up: DVec3) -> Vec<OrganCloud> {
+    let own: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
+    let graph = CloudGraph::new(&own);
+    let grain = grain(&own, &Nearest::of(&own));
+    let base = ground_point(&own, up);
+    let branches = crate::graph::skeleton(&own, &graph, base, 2.0 * grain, |centre, _| centre.dot(up));
+    let kept = crate::graph::prune(branches, &own, 4.0 * grain);
+    kept.into_iter()
+        .enumerate()
+        .map(|(k, branch)| {
+            let kind = if k == 0 { OrganKind::MainStem } else { OrganKind::Stem };
+            organ(points, kind, branch.members.into_iter().map(|i| members[i]).collect())
+        })
+        .collect()
+}
