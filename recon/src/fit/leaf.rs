@@ -34,7 +34,6 @@ pub(super) struct LeafFit {
     /// Share of the surface with data beside it.
     pub visible: f64,
     pub converged: bool,
-    pub cost: f64,
 }
 
 #[derive(Clone)]
@@ -72,8 +71,8 @@ pub(super) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -
     let spacing = median(gaps).unwrap_or(0.0).max(1e-6);
     let data = Data { base, points, tree, spacing, species };
     let mut state = data.first_guess(up);
-    let ended = minimise(&mut state, 25, |s| data.normal(s), |s, step| data.apply(s, step));
-    data.finish(state, ended.converged, ended.cost)
+    let converged = minimise(&mut state, 25, |s| data.normal(s), |s, step| data.apply(s, step));
+    data.finish(state, converged)
 }
 
 impl Data<'_> {
@@ -185,7 +184,7 @@ impl Data<'_> {
         }
     }
 
-    fn finish(&self, state: State, converged: bool, cost: f64) -> LeafFit {
+    fn finish(&self, state: State, converged: bool) -> LeafFit {
         let raw = self.species.leaf.jacobian(&state.blade()).points;
         let surface = self.posed(&state, &raw);
         let grid = Nearest::of(&surface);
@@ -199,7 +198,6 @@ impl Data<'_> {
             visible: seen as f64 / POINTS as f64,
             blade: state.blade(),
             converged,
-            cost,
         }
     }
 }

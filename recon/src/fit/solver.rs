@@ -47,22 +47,15 @@ impl Normal {
     }
 }
 
-/// How a minimisation ended.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ended {
-    pub cost: f64,
-    /// The cost stopped falling before the iterations ran out.
-    pub converged: bool,
-}
-
 /// Minimises from `state`; `normal` linearises (and finds correspondences anew), `apply` takes a step inside the
-/// model. A step is kept only when the newly matched cost falls.
+/// model. A step is kept only when the newly matched cost falls. True when the cost stopped falling before the
+/// iterations ran out.
 pub(super) fn minimise<S: Clone>(
     state: &mut S,
     iterations: usize,
     normal: impl Fn(&S) -> Normal,
     apply: impl Fn(&S, &DVector<f64>) -> S,
-) -> Ended {
+) -> bool {
     // Relative fall of the cost below which a fit has converged.
     const TOLERANCE: f64 = 1e-4;
     let mut damping = 1e-2;
@@ -80,14 +73,14 @@ pub(super) fn minimise<S: Clone>(
             at = there;
             damping = (damping * 0.3).max(1e-6);
             if fall < TOLERANCE {
-                return Ended { cost: at.cost, converged: true };
+                return true;
             }
         } else {
             damping *= 6.0;
             if damping > 1e6 {
-                return Ended { cost: at.cost, converged: true };
+                return true;
             }
         }
     }
-    Ended { cost: at.cost, converged: false }
+    false
 }

@@ -53,7 +53,7 @@ pub(super) fn fit_path(path: &[DVec3], points: &[DVec3], species: &Species) -> S
     let bends = species.stem.deform.rank();
     // The bends' prior: 1 σ may cost as much as missing every control point by 0.5 % of the length.
     let prior = (0.005 * metres).powi(2);
-    let ended = minimise(
+    let converged = minimise(
         &mut state,
         12,
         |state| {
@@ -90,7 +90,7 @@ pub(super) fn fit_path(path: &[DVec3], points: &[DVec3], species: &Species) -> S
     let radius = ranges.stem_radius.clamp(median(offsets.clone()).unwrap_or(ranges.stem_radius.min));
     let residual = mean(offsets.iter().map(|d| (d - radius).abs()));
     let rotation = (state.rotation * gauge(&raw).inverse()).normalize();
-    StemFit { rotation, length: s, gamma: state.gamma, radius, residual, converged: ended.converged }
+    StemFit { rotation, length: s, gamma: state.gamma, radius, residual, converged }
 }
 
 /// Coefficients inside the model: |c| <= 3 σ.

@@ -191,7 +191,7 @@ impl Organ {
             Form::Leaf { blade, .. } => (vec![&blade.beta, &blade.gamma], "width", blade.width),
         };
         check(key, "finite and above 0", size, size.is_finite() && size > 0.0)?;
-        let worst = coefficients.into_iter().flatten().copied().find(|c| !(c.abs() <= 10.0));
+        let worst = coefficients.into_iter().flatten().copied().find(|c| c.is_nan() || c.abs() > 10.0);
         check("coefficients", "within 10 standard deviations", worst.unwrap_or(0.0), worst.is_none())
     }
 }
