@@ -1,5 +1,5 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup demo check fmt
+.PHONY: setup demo check fmt bench
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
 
@@ -22,3 +22,7 @@ check:
 
 fmt:
 	cargo fmt --all
+
+# Times of the hot paths, in the profile that everything else shares.
+bench: setup
+	cargo bench --locked --workspace --profile dev --bench '*'

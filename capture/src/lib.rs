@@ -1,1 +1,34 @@
-//! Placeholder.
+//! Frames from cameras and recordings, decoded strictly and gated with reasons.
+//!
+//! ```text
+//! Source::next ──► Frame ──► Gate::admit ──► Rgb ──► (models)
+//!      │                         │
+//!      └─ SourceError::Frame     └─ Refusal
+//!              └──── Reason ◄────────┘   one counter each, in Counts
+//! ```
+//!
+//! Start at [`Source`]: whatever gives frames is one. [`Replay`] gives those of a recorded session, [`Recorder`] writes
+//! such a session, and [`Manifest`] is its `session.toml`. [`Gate::admit`] puts a frame in order, decodes it ([`decode`])
+//! and looks at exposure and sharpness. A frame that is no good ends in exactly one [`Reason`] and the run goes on; only
+//! a broken recording as a whole ([`SessionError`]) or a source that is gone ([`SourceError::Lost`]) stops it.
+//!
+//! Spec: appliance.md "Data path", "Cameras", "A recorded session"; reliability.md 23 and 24. The crate knows no network,
+//! plant or store.
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod counts;
+mod gate;
+mod order;
+mod pixels;
+mod session;
+mod source;
+
+pub use counts::{Counts, Reason};
+pub use gate::{Gate, GateConfig, Refusal, Verdict};
+pub use pixels::{DecodeError, MAX_PIXELS, decode, decode_photo};
+pub use session::{
+    FileFault, FrameError, FrameFault, MAX_FRAME_BYTES, Manifest, ManifestError, Pace, Recorder, Replay, Row,
+    SCHEMA_VERSION, SessionCamera, SessionError,
+};
+pub use source::{Source, SourceError};

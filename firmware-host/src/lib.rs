@@ -1,1 +1,10 @@
-//! Placeholder.
+//! The daemon and the command line of Demeter Field: pipeline, store, status page.
+//!
+//! Start with [`cli`] for the commands and [`report`] for what they print.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod cli;
+pub mod commands;
+pub mod error;
+pub mod output;
+pub mod report;

@@ -3,9 +3,13 @@
 //! Pure functions: no I/O, clock, threads or logging, and nothing that leaves a hash map unsorted, so the same input
 //! gives the same bytes everywhere. Start with [`model::plant`].
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
 pub mod cloud;
+pub mod export;
 pub mod fit;
 pub mod graph;
+pub mod import;
 pub mod metrics;
 pub mod model;
 pub mod nearest;
@@ -13,3 +17,4 @@ pub mod organs;
 pub mod segment;
 pub mod species;
 pub mod tree;
+pub mod view;

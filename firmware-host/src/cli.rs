@@ -1,0 +1,66 @@
+//! The command line (spec/appliance.md "Command line"): one line here and one in `run` a command, the rest in
+//! [`crate::commands`].
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+use crate::commands::doctor;
+use crate::error::{CommandError, Exit};
+use crate::output::Output;
+
+/// Turns camera frames of crop rows into 3D plants.
+#[derive(Parser)]
+#[command(name = "demeter", version)]
+struct Cli {
+    /// Answer with JSON on standard output.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
+    Doctor(doctor::Args),
+}
+
+impl Command {
+    fn run(&self, output: &Output) -> Result<Exit, CommandError> {
+        match self {
+            Self::Doctor(args) => doctor::run(args, output),
+        }
+    }
+}
+
+/// Runs the program: parses the arguments, runs the command, reports its error.
+#[must_use]
+pub fn main() -> ExitCode {
+    // Progress and logs go to standard error; RUST_LOG chooses how much.
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,demeter=info"));
+    tracing_subscriber::fmt().with_writer(std::io::stderr).with_env_filter(filter).with_target(false).init();
+    let result = match Cli::try_parse() {
+        Ok(cli) => {
+            let output = Output::new(cli.json);
+            cli.command.run(&output).map_err(|error| (output, error))
+        }
+        // Help and version are no errors: clap prints them and they end with 0.
+        Err(help) if !help.use_stderr() => {
+            return if help.print().is_ok() { Exit::Done } else { Exit::Failed }.into();
+        }
+        Err(wrong) => {
+            let output = Output::new(std::env::args_os().any(|a| a == "--json"));
+            Err((output, CommandError::usage("usage", wrong.render())))
+        }
+    };
+    match result {
+        Ok(exit) => exit,
+        Err((output, error)) => {
+            output.error(&error);
+            error.exit
+        }
+    }
+    .into()
+}

@@ -1,0 +1,5 @@
+//! Files of others, read from bytes.
+
+mod ply;
+
+pub use ply::{MAX_POINTS, PlyError};

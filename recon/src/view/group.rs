@@ -1,0 +1,273 @@
+//! Organs of one view to plants.
+
+use glam::{DVec2, DVec3};
+
+use super::gap::Near;
+use super::lift::principal_axes;
+use super::{LiftedOrgan, View};
+use crate::model::OrganKind;
+use crate::organs::OrganCloud;
+
+/// Two pieces of main stem are one when the shorter lies this near to the longer's axis and this near to its end, in
+/// lengths of the longer (guesses: stems of neighbours stand farther apart, pieces of one are cut by a blade).
+const COLLINEAR: f64 = 0.12;
+const CUT: f64 = 0.8;
+/// An organ hangs on a plant over a gap of at most its own size or this share of the main stem's, whichever is larger:
+/// a hidden petiole leaves such a gap (a guess).
+const REACH: f64 = 0.5;
+/// Organs that reach no main stem belong together over gaps of at most this share of the smaller one's size (a guess).
+const LOOSE: f64 = 0.5;
+/// A main stem that is put where none was seen has this many points.
+const STAND_IN_POINTS: usize = 48;
+/// And is at least this long, in sizes of its plant.
+const STAND_IN_LENGTH: f64 = 0.1;
+/// Farthest that the ray to a base may move it along the ground, metres (a guess: monocular depth is about 10 % off).
+const MAX_SHIFT: f64 = 0.3;
+/// Share of points at either end of an organ that make its end.
+const END: f64 = 0.03;
+
+/// One plant of a view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantView {
+    /// Its organs in the frame they were lifted into; organ 0 is the main stem.
+    pub organs: Vec<OrganCloud>,
+    /// Instances of the raster that belong to it, ascending.
+    pub instances: Vec<u16>,
+    /// Whether no main stem was seen and organ 0 is a stand-in.
+    pub stand_in: bool,
+    /// The main stem's lowest point.
+    pub base: DVec3,
+    /// The pixel it was seen in, row major; `None` for a stand-in.
+    pub base_pixel: Option<u32>,
+    /// Pixels of all its instances.
+    pub pixels: usize,
+    /// Whether one of them touches the picture's border.
+    pub touches_border: bool,
+    /// First and last column and row: `[x0, y0, x1, y1]`, inclusive.
+    pub bounds: [u32; 4],
+}
+
+/// Why organs make no plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum GroupError {
+    /// A main stem without a leaf.
+    #[error("expected a leaf on the main stem, found none")]
+    NoLeaf,
+    /// No main stem, and too little to say where it would be.
+    #[error("expected a main stem or at least two organs, found one organ")]
+    NoMainStem,
+}
+
+/// Organs that make no plant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refused {
+    /// Their instances, ascending.
+    pub instances: Vec<u16>,
+    /// Why.
+    pub reason: GroupError,
+}
+
+/// Divides a view's organs into plants, the largest (in pixels) first.
+///
+/// A minimum spanning forest rooted at the main stems: again and again the organ with the smallest gap to a plant's
+/// stems joins it (leaves carry nothing). What reaches no main stem forms plants of its own, whose stem is its lowest
+/// stem or a stand-in through the leaves' bases.
+#[must_use]
+pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Refused>) {
+    let up = super::scale::up(view);
+    let near: Vec<Near> = organs.iter().map(|organ| Near::new(&organ.cloud.points)).collect();
+    let mut plants: Vec<Vec<usize>> = main_stems(organs, &near);
+    let loose = spread(organs, &near, &mut plants);
+    let rooted = plants.len();
+    plants.extend(loose_plants(&near, &loose));
+
+    let (mut views, mut refused) = (Vec::new(), Vec::new());
+    for (i, members) in plants.into_iter().enumerate() {
+        let leaves = members.iter().filter(|&&m| organs[m].cloud.kind == OrganKind::Leaf).count();
+        let mut instances: Vec<u16> = members.iter().map(|&m| organs[m].region.id).collect();
+        instances.sort_unstable();
+        if leaves == 0 {
+            refused.push(Refused { instances, reason: GroupError::NoLeaf });
+        } else if i >= rooted && members.len() < 2 {
+            refused.push(Refused { instances, reason: GroupError::NoMainStem });
+        } else {
+            views.push(plant(organs, &members, instances, up));
+        }
+    }
+    views.sort_by_key(|plant| (std::cmp::Reverse(plant.pixels), plant.instances[0]));
+    (views, refused)
+}
+
+/// Main stems as lists of their pieces.
+fn main_stems(organs: &[LiftedOrgan], near: &[Near]) -> Vec<Vec<usize>> {
+    let mut pieces: Vec<usize> = (0..organs.len()).filter(|&i| organs[i].cloud.kind == OrganKind::MainStem).collect();
+    pieces.sort_by(|&a, &b| near[b].size().total_cmp(&near[a].size()).then(a.cmp(&b)));
+    let mut stems: Vec<Vec<usize>> = Vec::new();
+    for piece in pieces {
+        let continues = |stem: &&mut Vec<usize>| {
+            let longest = stem[0];
+            let length = near[longest].size();
+            let (centre, axes) = principal_axes(&organs[longest].cloud.points);
+            let points = &organs[piece].cloud.points;
+            let off = |p: &DVec3| (*p - centre).reject_from(axes.x_axis).length();
+            let aside = points.iter().map(off).sum::<f64>() / points.len() as f64;
+            let gap = stem.iter().map(|&s| near[s].gap(&near[piece])).fold(f64::INFINITY, f64::min);
+            aside <= COLLINEAR * length && gap <= CUT * length
+        };
+        match stems.iter_mut().find(continues) {
+            Some(stem) => stem.push(piece),
+            None => stems.push(vec![piece]),
+        }
+    }
+    stems
+}
+
+/// Hangs organs on plants, nearest first; returns those that reach none.
+fn spread(organs: &[LiftedOrgan], near: &[Near], plants: &mut [Vec<usize>]) -> Vec<usize> {
+    let mut free: Vec<usize> = (0..organs.len()).filter(|&i| organs[i].cloud.kind != OrganKind::MainStem).collect();
+    let mut best: Vec<(f64, usize)> = vec![(f64::INFINITY, 0); organs.len()];
+    let reach: Vec<f64> = plants.iter().map(|stem| REACH * near[stem[0]].size()).collect();
+    let improve = |best: &mut [(f64, usize)], free: &[usize], from: usize, plant: usize| {
+        for &i in free {
+            if near[from].at_least(&near[i]) < best[i].0 {
+                let gap = near[from].gap(&near[i]);
+                if gap < best[i].0 && gap <= reach[plant].max(near[i].size()) {
+                    best[i] = (gap, plant);
+                }
+            }
+        }
+    };
+    for (plant, stem) in plants.iter().enumerate() {
+        for &piece in stem {
+            improve(&mut best, &free, piece, plant);
+        }
+    }
+    while let Some(k) = (0..free.len()).min_by(|&a, &b| best[free[a]].0.total_cmp(&best[free[b]].0)) {
+        let (gap, plant) = best[free[k]];
+        if gap == f64::INFINITY {
+            break;
+        }
+        let organ = free.remove(k);
+        plants[plant].push(organ);
+        if organs[organ].cloud.kind != OrganKind::Leaf {
+            improve(&mut best, &free, organ, plant);
+        }
+    }
+    free
+}
+
+/// Clusters organs without a main stem by their gaps (single linkage).
+fn loose_plants(near: &[Near], loose: &[usize]) -> Vec<Vec<usize>> {
+    let mut left: Vec<usize> = loose.to_vec();
+    let mut clusters = Vec::new();
+    while !left.is_empty() {
+        let mut cluster = vec![left.remove(0)];
+        let mut next = 0;
+        while next < cluster.len() {
+            let from = cluster[next];
+            let (joined, apart) = left.into_iter().partition(|&i: &usize| {
+                let limit = LOOSE * near[from].size().min(near[i].size());
+                near[from].at_least(&near[i]) <= limit && near[from].gap(&near[i]) <= limit
+            });
+            cluster.extend::<Vec<usize>>(joined);
+            left = apart;
+            next += 1;
+        }
+        clusters.push(cluster);
+    }
+    clusters
+}
+
+fn plant(organs: &[LiftedOrgan], members: &[usize], instances: Vec<u16>, up: DVec3) -> PlantView {
+    let height = |p: &DVec3| p.dot(up);
+    let main: Vec<usize> = of_kind(organs, members, OrganKind::MainStem);
+    // Without a main stem the stem that reaches lowest is taken for it.
+    let foot = |&i: &usize| organs[i].cloud.points.iter().map(height).fold(f64::INFINITY, f64::min);
+    let lowest =
+        of_kind(organs, members, OrganKind::Stem).into_iter().min_by(|a, b| foot(a).total_cmp(&foot(b)).then(a.cmp(b)));
+    let pieces: Vec<usize> = if main.is_empty() { lowest.into_iter().collect() } else { main };
+    let stand_in = pieces.is_empty();
+    let mut stem = OrganCloud { kind: OrganKind::MainStem, points: Vec::new(), source: Vec::new() };
+    for &piece in &pieces {
+        stem.points.extend(&organs[piece].cloud.points);
+        stem.source.extend(&organs[piece].cloud.source);
+    }
+    if stand_in {
+        stem.points = stand_in_stem(organs, members, up);
+    }
+    let low = (0..stem.points.len()).min_by(|&a, &b| height(&stem.points[a]).total_cmp(&height(&stem.points[b])));
+    let base = low.map_or(DVec3::ZERO, |i| stem.points[i]);
+    let base_pixel = low.and_then(|i| stem.source.get(i).copied());
+    let mut rest: Vec<usize> = members.iter().copied().filter(|m| !pieces.contains(m)).collect();
+    rest.sort_unstable();
+    let regions = members.iter().map(|&m| &organs[m].region);
+    PlantView {
+        organs: std::iter::once(stem).chain(rest.iter().map(|&m| organs[m].cloud.clone())).collect(),
+        instances,
+        stand_in,
+        base,
+        base_pixel,
+        pixels: regions.clone().map(|r| r.pixels).sum(),
+        touches_border: regions.clone().any(|r| r.touches_border),
+        bounds: regions.fold([u32::MAX, u32::MAX, 0, 0], |[x0, y0, x1, y1], r| {
+            [x0.min(r.bounds[0]), y0.min(r.bounds[1]), x1.max(r.bounds[2]), y1.max(r.bounds[3])]
+        }),
+    }
+}
+
+fn of_kind(organs: &[LiftedOrgan], members: &[usize], kind: OrganKind) -> Vec<usize> {
+    let mut found: Vec<usize> = members.iter().copied().filter(|&m| organs[m].cloud.kind == kind).collect();
+    found.sort_unstable();
+    found
+}
+
+/// An upright line through the middle of the leaves' bases, from the plant's lowest point to its highest leaf base.
+fn stand_in_stem(organs: &[LiftedOrgan], members: &[usize], up: DVec3) -> Vec<DVec3> {
+    let points = || members.iter().flat_map(|&m| organs[m].cloud.points.iter());
+    let count = points().count() as f64;
+    let middle = points().sum::<DVec3>() / count;
+    let size = 2.0 * (points().map(|p| (*p - middle).length_squared()).sum::<f64>() / count).sqrt();
+    let bases: Vec<DVec3> = members.iter().map(|&m| nearer_end(&organs[m].cloud.points, middle)).collect();
+    let foot = bases.iter().sum::<DVec3>() / bases.len() as f64;
+    let lowest = points().map(|p| p.dot(up)).fold(f64::INFINITY, f64::min);
+    let highest = bases.iter().map(|p| p.dot(up)).fold(f64::NEG_INFINITY, f64::max);
+    let length = (highest - lowest).max(STAND_IN_LENGTH * size);
+    let bottom = foot + up * (lowest - foot.dot(up));
+    (0..STAND_IN_POINTS).map(|i| bottom + up * (length * i as f64 / (STAND_IN_POINTS - 1) as f64)).collect()
+}
+
+/// The middle of the end, along the longest axis, that is nearer to `target`.
+fn nearer_end(points: &[DVec3], target: DVec3) -> DVec3 {
+    let (centre, axes) = principal_axes(points);
+    let mut sorted: Vec<DVec3> = points.to_vec();
+    sorted.sort_by(|a, b| (*a - centre).dot(axes.x_axis).total_cmp(&(*b - centre).dot(axes.x_axis)));
+    let few = ((points.len() as f64 * END) as usize).max(1);
+    let mean = |some: &[DVec3]| some.iter().sum::<DVec3>() / some.len() as f64;
+    let (first, last) = (mean(&sorted[..few]), mean(&sorted[points.len() - few..]));
+    if first.distance(target) <= last.distance(target) { first } else { last }
+}
+
+impl PlantView {
+    /// Where it stands on the ground z = 0: under the ray to its base when that was seen, which a wrong depth cannot
+    /// move; else under the base itself. Metres, in a view with a pose.
+    #[must_use]
+    pub fn ground_position(&self, view: &View<'_>) -> DVec2 {
+        let hit = self.base_pixel.zip(view.world_from_camera).and_then(|(p, pose)| {
+            let at = DVec2::new(f64::from(p % view.intrinsics.width) + 0.5, f64::from(p / view.intrinsics.width) + 0.5);
+            let ray = pose.rotation * view.intrinsics.unproject(at, 1.0);
+            let depth = -pose.translation.z / ray.z;
+            let hit = (pose.translation + ray * depth).truncate();
+            // A base that was hidden is seen too high and meets the ground far behind the plant.
+            (depth > 0.0 && hit.distance(self.base.truncate()) <= MAX_SHIFT).then_some(hit)
+        });
+        hit.unwrap_or(self.base.truncate())
+    }
+
+    /// How far its middle is from the picture's, 0 at the middle to 1 at a corner.
+    #[must_use]
+    pub fn off_centre(&self, view: &View<'_>) -> f64 {
+        let (w, h) = (f64::from(view.intrinsics.width), f64::from(view.intrinsics.height));
+        let [x0, y0, x1, y1] = self.bounds.map(f64::from);
+        DVec2::new((x0 + x1 + 1.0) / w - 1.0, (y0 + y1 + 1.0) / h - 1.0).length() / 2f64.sqrt()
+    }
+}

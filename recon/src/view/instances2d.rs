@@ -1,0 +1,164 @@
+//! Organ instances of a picture from classes and boundary distance.
+
+use std::collections::VecDeque;
+
+use demeter_frame::{Instances, Semantic};
+use image::ImageBuffer;
+
+use super::View;
+use crate::model::OrganKind;
+
+/// Pixels at or over this truncated inverse distance lie at the border of two organs and found no instance. With
+/// t = δ / max(d, δ) it is a distance of 2 δ (ours to tune, reconstruction.md "Points to organs").
+const BOUNDARY: f32 = 0.5;
+/// The smallest seed at 640 x 480, pixels: smaller ones are specks (a guess).
+const MIN_SEED: f64 = 10.0;
+/// Most instances in one picture; the smallest go first. A bound for later stages, far above any plant row in view.
+const MAX_INSTANCES: usize = 1024;
+
+/// One organ instance in the picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// Its id in the raster, 1 and up, in the order of first pixels.
+    pub id: u16,
+    /// What it is.
+    pub kind: OrganKind,
+    /// How many pixels it has.
+    pub pixels: usize,
+    /// Whether it touches the picture's border.
+    pub touches_border: bool,
+    /// First and last column and row: `[x0, y0, x1, y1]`, inclusive.
+    pub bounds: [u32; 4],
+}
+
+/// Divides the organ pixels of a view into instances.
+///
+/// Seeds are connected pixels of one class far from other organs; the other pixels of the class go to the seed that is
+/// nearest inside the class. Patches that no seed reaches (thin organs, boundary all over) are instances of their own.
+#[must_use]
+pub fn instances(view: &View<'_>) -> (Instances, Vec<Region>) {
+    let grid = Grid { width: view.intrinsics.width as usize, height: view.intrinsics.height as usize };
+    let class: Vec<u8> = view.semantic.as_raw().iter().map(|&c| if kind(c).is_some() { c } else { 0 }).collect();
+    let dist = view.dist.as_raw();
+    // Main stems do not cross, but leaves all along would cut them: they need no boundary.
+    let is_core = |c: u8, t: f32| c == Semantic::MainStem as u8 || t < BOUNDARY;
+    let core: Vec<u8> = class.iter().zip(dist).map(|(&c, &t)| if is_core(c, t) { c } else { 0 }).collect();
+    let min_seed = view.pixels(MIN_SEED);
+
+    let (mut label, seeds) = grid.components(&core, min_seed, 0);
+    grid.grow(&class, &mut label);
+    let rest: Vec<u8> = class.iter().zip(&label).map(|(&c, &l)| if l == 0 { c } else { 0 }).collect();
+    let (others, count) = grid.components(&rest, min_seed, seeds);
+    for (l, other) in label.iter_mut().zip(others) {
+        *l = (*l).max(other);
+    }
+    grid.table(&class, &label, count)
+}
+
+fn kind(class: u8) -> Option<OrganKind> {
+    const LEAF: u8 = Semantic::Leaf as u8;
+    const STEM: u8 = Semantic::Stem as u8;
+    const MAIN: u8 = Semantic::MainStem as u8;
+    match class {
+        LEAF => Some(OrganKind::Leaf),
+        STEM => Some(OrganKind::Stem),
+        MAIN => Some(OrganKind::MainStem),
+        _ => None,
+    }
+}
+
+struct Grid {
+    width: usize,
+    height: usize,
+}
+
+impl Grid {
+    /// The up to eight neighbours of pixel `p`: stems one pixel wide run diagonally.
+    fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> {
+        let (x, y, width, height) = (p % self.width, p / self.width, self.width, self.height);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        rows.flat_map(move |j| (x.saturating_sub(1)..(x + 2).min(width)).map(move |i| j * width + i))
+            .filter(move |&q| q != p)
+    }
+
+    /// Connected pixels of equal, non-zero `key`, at least `min` of them: labels from `first` + 1 on, and the last.
+    fn components(&self, key: &[u8], min: usize, first: u32) -> (Vec<u32>, u32) {
+        let mut label = vec![0u32; key.len()];
+        let mut seen = vec![false; key.len()];
+        let mut last = first;
+        let mut patch = Vec::new();
+        for start in 0..key.len() {
+            if key[start] == 0 || seen[start] {
+                continue;
+            }
+            patch.clear();
+            patch.push(start);
+            seen[start] = true;
+            let mut next = 0;
+            while next < patch.len() {
+                for q in self.neighbours(patch[next]) {
+                    if key[q] == key[start] && !seen[q] {
+                        seen[q] = true;
+                        patch.push(q);
+                    }
+                }
+                next += 1;
+            }
+            if patch.len() >= min {
+                last += 1;
+                for &p in &patch {
+                    label[p] = last;
+                }
+            }
+        }
+        (label, last)
+    }
+
+    /// Gives every pixel that a label reaches inside its class the nearest one (breadth first, so in steps).
+    fn grow(&self, class: &[u8], label: &mut [u32]) {
+        let mut queue: VecDeque<usize> = (0..label.len()).filter(|&p| label[p] != 0).collect();
+        while let Some(p) = queue.pop_front() {
+            for q in self.neighbours(p) {
+                if label[q] == 0 && class[q] == class[p] {
+                    label[q] = label[p];
+                    queue.push_back(q);
+                }
+            }
+        }
+    }
+
+    /// The raster and table of labels 1..=`count`, numbered anew in the order of first pixels.
+    fn table(&self, class: &[u8], label: &[u32], count: u32) -> (Instances, Vec<Region>) {
+        let mut sizes = vec![0usize; count as usize + 1];
+        for &l in label {
+            sizes[l as usize] += 1;
+        }
+        let mut kept: Vec<u32> = (1..=count).collect();
+        kept.sort_by_key(|&l| (std::cmp::Reverse(sizes[l as usize]), l));
+        kept.truncate(MAX_INSTANCES);
+        let mut is_kept = vec![false; count as usize + 1];
+        for l in kept {
+            is_kept[l as usize] = true;
+        }
+
+        let mut id = vec![0u16; count as usize + 1];
+        let mut regions: Vec<Region> = Vec::new();
+        let mut raster = ImageBuffer::new(self.width as u32, self.height as u32);
+        for ((p, &l), pixel) in label.iter().enumerate().zip(raster.iter_mut()) {
+            let (Some(kind), true) = (kind(class[p]), is_kept[l as usize]) else { continue };
+            let (x, y) = ((p % self.width) as u32, (p / self.width) as u32);
+            if id[l as usize] == 0 {
+                id[l as usize] = regions.len() as u16 + 1;
+                let (id, bounds) = (id[l as usize], [x, y, x, y]);
+                regions.push(Region { id, kind, pixels: 0, touches_border: false, bounds });
+            }
+            *pixel = id[l as usize];
+            let region = &mut regions[usize::from(id[l as usize]) - 1];
+            region.pixels += 1;
+            let [x0, y0, x1, y1] = region.bounds;
+            region.bounds = [x0.min(x), y0.min(y), x1.max(x), y1.max(y)];
+            region.touches_border |= x == 0 || y == 0 || x as usize == self.width - 1 || y as usize == self.height - 1;
+        }
+        (raster, regions)
+    }
+}

@@ -1,0 +1,152 @@
+//! Organ instances of a picture into space.
+
+use demeter_frame::{Instances, Pose};
+use glam::{DMat3, DVec2, DVec3};
+use nalgebra::{Matrix3, SymmetricEigen};
+
+use super::{DepthScale, Region, View};
+use crate::model::OrganKind;
+use crate::organs::OrganCloud;
+
+/// A surface seen steeper than this (tangent of the angle between its normal and the ray) is taken for a depth edge:
+/// 84 degrees, where a pixel's depth says little. Ours; the paper only says "gradient".
+const MAX_SLOPE: f64 = 10.0;
+/// Fewest points of a stem and of a leaf at 640 x 480 (paper supp. "2D Reconstruction").
+const MIN_STEM: f64 = 30.0;
+const MIN_LEAF: f64 = 100.0;
+/// A leaf is a sheet: its oriented box is not as thick as this share of its length, nor so narrow that it is a line.
+/// The paper gives no numbers; arched and rolled maize blades stay well inside these.
+const MAX_LEAF_THICKNESS: f64 = 0.6;
+const MIN_LEAF_WIDTH: f64 = 0.02;
+
+/// One organ in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LiftedOrgan {
+    /// Kind and points; `source` holds pixel numbers, row major.
+    pub cloud: OrganCloud,
+    /// Its region in the picture.
+    pub region: Region,
+}
+
+/// Why an instance was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DropReason {
+    /// Too few points with depth away from depth edges.
+    FewPoints,
+    /// A leaf as thick as long.
+    Thick,
+    /// A leaf as narrow as a line.
+    Narrow,
+}
+
+/// An instance left out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dropped {
+    /// Its id in the raster.
+    pub instance: u16,
+    /// Why.
+    pub reason: DropReason,
+    /// What was counted or measured (points, or a share of the length).
+    pub found: f64,
+}
+
+/// What came of a picture's instances.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lifted {
+    /// Those that made it, in the order of their ids.
+    pub organs: Vec<LiftedOrgan>,
+    /// Those that did not.
+    pub dropped: Vec<Dropped>,
+}
+
+/// Unprojects every instance: into the world when the camera's place is known, else into the camera's frame; metres
+/// when `scale` is metric.
+#[must_use]
+pub fn lift(view: &View<'_>, raster: &Instances, regions: &[Region], scale: DepthScale) -> Lifted {
+    let mut clouds: Vec<(Vec<DVec3>, Vec<u32>)> = vec![Default::default(); regions.len()];
+    let target_from_camera = view.world_from_camera.unwrap_or(Pose::IDENTITY);
+    let width = view.intrinsics.width as usize;
+    for (p, &id) in raster.as_raw().iter().enumerate() {
+        let Some((points, source)) = usize::from(id).checked_sub(1).and_then(|i| clouds.get_mut(i)) else { continue };
+        let Some(z) = view.depth(p, scale.factor) else { continue };
+        if steep(view, raster.as_raw(), p) {
+            continue;
+        }
+        let at = DVec2::new((p % width) as f64 + 0.5, (p / width) as f64 + 0.5);
+        points.push(target_from_camera.point(view.intrinsics.unproject(at, z)));
+        source.push(p as u32);
+    }
+    let mut lifted = Lifted::default();
+    for (region, (points, source)) in regions.iter().zip(clouds) {
+        let least = view.pixels(if region.kind == OrganKind::Leaf { MIN_LEAF } else { MIN_STEM });
+        let fault = if points.len() < least.max(3) {
+            Some((DropReason::FewPoints, points.len() as f64))
+        } else if region.kind == OrganKind::Leaf {
+            implausible(&points)
+        } else {
+            None
+        };
+        match fault {
+            Some((reason, found)) => lifted.dropped.push(Dropped { instance: region.id, reason, found }),
+            None => {
+                let cloud = OrganCloud { kind: region.kind, points, source };
+                lifted.organs.push(LiftedOrgan { cloud, region: region.clone() });
+            }
+        }
+    }
+    lifted
+}
+
+/// Whether depth changes too fast towards a neighbour of the same instance. Across instances it may jump: that is one
+/// organ before another, and both are where they seem.
+fn steep(view: &View<'_>, raster: &[u16], p: usize) -> bool {
+    let (width, log_depth) = (view.intrinsics.width as usize, view.log_depth.as_raw());
+    // One pixel is 1/f of the depth wide, so a surface of slope s changes the logarithm of depth by s/f.
+    let limit = |f: f64| (MAX_SLOPE / f) as f32;
+    let jump = |q: usize| (log_depth[q] - log_depth[p]).abs();
+    let jumps = |q: usize, f: f64| raster[q] == raster[p] && (jump(q).is_nan() || jump(q) > limit(f));
+    let (x, fx, fy) = (p % width, view.intrinsics.fx, view.intrinsics.fy);
+    (x > 0 && jumps(p - 1, fx))
+        || (x + 1 < width && jumps(p + 1, fx))
+        || (p >= width && jumps(p - width, fy))
+        || (p + width < raster.len() && jumps(p + width, fy))
+}
+
+/// What is wrong with the proportions of a leaf's oriented box.
+fn implausible(points: &[DVec3]) -> Option<(DropReason, f64)> {
+    let [length, width, thickness] = box_sides(points);
+    if thickness > MAX_LEAF_THICKNESS * length {
+        Some((DropReason::Thick, thickness / length))
+    } else if width < MIN_LEAF_WIDTH * length {
+        Some((DropReason::Narrow, width / length))
+    } else {
+        None
+    }
+}
+
+/// Sides of the box along the principal axes that holds all but 2 % of the points at either end, longest first.
+fn box_sides(points: &[DVec3]) -> [f64; 3] {
+    let (centre, axes) = principal_axes(points);
+    let mut sides = [0, 1, 2].map(|k| {
+        let mut along: Vec<f64> = points.iter().map(|p| (*p - centre).dot(axes.col(k))).collect();
+        along.sort_by(f64::total_cmp);
+        along[(along.len() - 1) * 98 / 100] - along[(along.len() - 1) * 2 / 100]
+    });
+    sides.sort_by(|a, b| b.total_cmp(a));
+    sides
+}
+
+/// Mean and principal axes (columns, longest spread first) of at least one point.
+pub(super) fn principal_axes(points: &[DVec3]) -> (DVec3, DMat3) {
+    let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+    let mut covariance = Matrix3::zeros();
+    for p in points {
+        let d = (*p - centre).to_array();
+        covariance += Matrix3::from_fn(|i, j| d[i] * d[j]);
+    }
+    let eigen = SymmetricEigen::new(covariance);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let axis = |k: usize| DVec3::from_array(std::array::from_fn(|i| eigen.eigenvectors[(i, order[k])]));
+    (centre, DMat3::from_cols(axis(0), axis(1), axis(2)))
+}

@@ -1,0 +1,193 @@
+//! Which plant along the row an observation belongs to.
+
+use glam::DVec2;
+
+/// A track ends when the camera has moved this far since it was last seen, metres: a plant that is hidden or missed for
+/// that long has left the picture (a guess for cameras that see 1 m of row).
+const PASSED_M: f64 = 0.5;
+/// Most tracks open at once; the one unseen for longest is closed for a new one. A picture holds far fewer plants.
+const MAX_OPEN: usize = 256;
+
+/// How far from a track's position an observation may lie, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gate(pub f64);
+
+impl Gate {
+    /// Half the distance between plants as sown; without one 0.08 m, half of maize's usual 0.16 m.
+    #[must_use]
+    pub fn of_spacing(spacing_m: Option<f64>) -> Self {
+        Self(spacing_m.unwrap_or(0.16) / 2.0)
+    }
+}
+
+/// What makes one view of a plant better than another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// The whole plant is in the picture.
+    pub whole: bool,
+    /// How many pixels it has.
+    pub pixels: usize,
+    /// How far from the picture's middle it is, 0 to 1 (a corner).
+    pub off_centre: f64,
+}
+
+impl Quality {
+    /// Whole plants before cut ones, then size, of which a corner costs half: lenses and networks are worse there.
+    fn score(&self) -> (bool, f64) {
+        (self.whole, self.pixels as f64 * (1.0 - 0.5 * self.off_centre))
+    }
+
+    fn beats(&self, other: &Self) -> bool {
+        let ((whole, score), (other_whole, other_score)) = (self.score(), other.score());
+        (whole, score) > (other_whole, other_score)
+    }
+}
+
+/// A plant seen in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observation<T> {
+    /// Where it stands on the ground, metres.
+    pub position: DVec2,
+    /// How well it is seen.
+    pub quality: Quality,
+    /// What is kept of the best view.
+    pub view: T,
+}
+
+/// A plant that the camera has passed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Closed<T> {
+    /// Its number in the session, 1 and up: in the order of closing, and of opening where several close at once.
+    pub number: u64,
+    /// Mean of the observed positions, metres.
+    pub position: DVec2,
+    /// The frames it was seen in, in order.
+    pub frames: Vec<u64>,
+    /// The frame of the best view.
+    pub best_frame: u64,
+    /// The best view.
+    pub best: T,
+}
+
+#[derive(Clone, Debug)]
+struct Track<T> {
+    sum: DVec2,
+    frames: Vec<u64>,
+    last_camera: DVec2,
+    best: (Quality, u64, T),
+}
+
+impl<T> Track<T> {
+    fn position(&self) -> DVec2 {
+        self.sum / self.frames.len() as f64
+    }
+}
+
+/// Collects observations into plants while a camera drives along.
+///
+/// Every observation belongs to exactly one track; the order in which one frame's observations are given does not
+/// matter.
+#[derive(Clone, Debug)]
+pub struct Tracker<T> {
+    gate: Gate,
+    open: Vec<Track<T>>,
+    closed: u64,
+}
+
+impl<T> Tracker<T> {
+    /// A tracker that has seen nothing.
+    #[must_use]
+    pub fn new(gate: Gate) -> Self {
+        Self { gate, open: Vec::new(), closed: 0 }
+    }
+
+    /// Takes the plants of one frame, seen from `camera` (on the ground plane, metres), and gives those the camera has
+    /// passed. Observations whose position is not finite cannot be placed and are given back.
+    pub fn frame(
+        &mut self,
+        frame: u64,
+        camera: DVec2,
+        observations: Vec<Observation<T>>,
+    ) -> (Vec<Closed<T>>, Vec<Observation<T>>) {
+        let (mut seen, lost): (Vec<_>, Vec<_>) = observations.into_iter().partition(|o| o.position.is_finite());
+        seen.sort_by(|a, b| a.position.x.total_cmp(&b.position.x).then(a.position.y.total_cmp(&b.position.y)));
+        let matches = self.matches(&seen);
+        for (observation, matched) in seen.into_iter().zip(matches) {
+            let Observation { position, quality, view } = observation;
+            match matched {
+                Some(track) => {
+                    let track = &mut self.open[track];
+                    track.sum += position;
+                    track.frames.push(frame);
+                    track.last_camera = camera;
+                    if quality.beats(&track.best.0) {
+                        track.best = (quality, frame, view);
+                    }
+                }
+                None => self.open.push(Track {
+                    sum: position,
+                    frames: vec![frame],
+                    last_camera: camera,
+                    best: (quality, frame, view),
+                }),
+            }
+        }
+        let over = self.open.len().saturating_sub(MAX_OPEN);
+        let mut by_age: Vec<usize> = (0..self.open.len()).collect();
+        by_age.sort_by_key(|&i| (self.open[i].frames.last().copied(), i));
+        let crowded_out = by_age[..over].to_vec();
+        let mut index = 0;
+        let passed = self.open.extract_if(.., |track| {
+            index += 1;
+            crowded_out.contains(&(index - 1)) || track.last_camera.distance(camera) > PASSED_M
+        });
+        let passed: Vec<_> = passed.collect();
+        (self.close(passed), lost)
+    }
+
+    /// Closes what is still open.
+    pub fn finish(mut self) -> Vec<Closed<T>> {
+        let rest = std::mem::take(&mut self.open);
+        self.close(rest)
+    }
+
+    /// One track for each observation at most, and the other way round: nearest pairs first.
+    fn matches(&self, seen: &[Observation<T>]) -> Vec<Option<usize>> {
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for (t, track) in self.open.iter().enumerate() {
+            for (o, observation) in seen.iter().enumerate() {
+                let distance = track.position().distance(observation.position);
+                if distance <= self.gate.0 {
+                    pairs.push((distance, t, o));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let mut matched = vec![None; seen.len()];
+        let mut taken = vec![false; self.open.len()];
+        for (_, t, o) in pairs {
+            if !taken[t] && matched[o].is_none() {
+                taken[t] = true;
+                matched[o] = Some(t);
+            }
+        }
+        matched
+    }
+
+    fn close(&mut self, tracks: Vec<Track<T>>) -> Vec<Closed<T>> {
+        let first = self.closed;
+        self.closed += tracks.len() as u64;
+        let number = first + 1..;
+        tracks
+            .into_iter()
+            .zip(number)
+            .map(|(track, number)| Closed {
+                number,
+                position: track.position(),
+                frames: track.frames,
+                best_frame: track.best.1,
+                best: track.best.2,
+            })
+            .collect()
+    }
+}
