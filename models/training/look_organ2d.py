@@ -1,0 +1,74 @@
+#!/usr/bin/python3
+"""Paints what a checkpoint of organ2d sees in photos: photo, classes, boundaries and depth side by side, to look at.
+
+Where plants stand before a light wall, a threshold on colour gives a mask to compare with (`--before-light`): its figure
+is a sanity check on real photos, not truth, and never training data.
+"""
+
+import argparse
+import pathlib
+
+import numpy as np
+import torch
+from PIL import Image
+
+from network import Organ2d
+
+COLOURS = np.array([[0, 0, 0], [70, 200, 70], [240, 170, 40], [230, 40, 40]], np.uint8)
+LONG_SIDE = 384
+
+
+def working_image(path):
+    """As models/src/organ2d.rs does it: long side 384, sides multiples of 16."""
+    image = Image.open(path).convert("RGB")
+    scale = LONG_SIDE / max(image.size)
+    return image.resize([max(1, round(side * scale / 16)) * 16 for side in image.size], Image.BILINEAR)
+
+
+def green(rgb):
+    """Excess green (Woebbecke et al. 1995) of chromatic coordinates above 0.06 (tuned by eye)."""
+    share = rgb / np.maximum(rgb.sum(-1, keepdims=True), 1)
+    return 2 * share[..., 1] - share[..., 0] - share[..., 2] > 0.06
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("checkpoint", type=pathlib.Path)
+    parser.add_argument("images", nargs="+", type=pathlib.Path)
+    parser.add_argument("-o", "--out", type=pathlib.Path)
+    parser.add_argument("--before-light", action="store_true", help="compare with green above the lowest sixth (the pot)")
+    args = parser.parse_args()
+    torch.set_num_threads(1)
+    network = Organ2d().eval()
+    network.load_state_dict(torch.load(args.checkpoint)["average"])
+    rows, overlaps = [], []
+    for path in args.images:
+        rgb = np.asarray(working_image(path))
+        with torch.no_grad():
+            image = torch.from_numpy(rgb.transpose(2, 0, 1).astype(np.float32) / 255)[None]
+            logits, dist, depth = (output[0].numpy() for output in network(image))
+        best = logits.argmax(0)
+        if args.before_light:
+            above = slice(0, rgb.shape[0] * 5 // 6)
+            plant, mask = best[above] > 0, green(rgb.astype(np.float32))[above]
+            overlaps.append((plant & mask).sum() / max(1, (plant | mask).sum()))
+        if args.out:
+            plant = best > 0
+            near, far = (depth[0][plant].min(), depth[0][plant].max()) if plant.any() else (0, 1)
+            relative = np.where(plant, 255 - 200 * (depth[0] - near) / max(far - near, 1e-6), 0)
+            grey = [np.repeat(plane[..., None].clip(0, 255).astype(np.uint8), 3, -1) for plane in (dist[0] * 255 * plant, relative)]
+            row = Image.fromarray(np.concatenate([rgb, COLOURS[best], *grey], axis=1))
+            rows.append(row.resize((1200, max(1, row.height * 1200 // row.width))))
+    if overlaps:
+        print(f"IoU with the colour threshold: mean {np.mean(overlaps):.3f}, median {np.median(overlaps):.3f}, worst {min(overlaps):.3f}, {len(overlaps)} photos")
+    if args.out:
+        sheet = Image.new("RGB", (1200, sum(row.height for row in rows)))
+        top = 0
+        for row in rows:
+            sheet.paste(row, (0, top))
+            top += row.height
+        sheet.save(args.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""What training minimises, and the figures it is judged by."""
+
+import torch
+from torch.nn import functional as F
+
+from images import IGNORED
+from network import CLASSES
+
+# Stems cover few pixels; without weight they are traded for leaf edges. A guess.
+CLASS_WEIGHTS = torch.tensor([1.0, 1.0, 2.5, 2.5])
+# Soil teaches depth too, but plants are what depth is for. A guess.
+GROUND_WEIGHT = 0.25
+
+
+def semantic_loss(logits, sem):
+    """Cross entropy, and Dice over the organ classes because they are thin."""
+    entropy = F.cross_entropy(logits, sem, CLASS_WEIGHTS, ignore_index=IGNORED)
+    seen = (sem != IGNORED).float()[:, None]
+    p = logits.softmax(1) * seen
+    truth = F.one_hot(sem.clamp(max=CLASSES - 1), CLASSES).permute(0, 3, 1, 2) * seen
+    both = (p * truth).sum((0, 2, 3))
+    dice = 1 - (2 * both + 1) / (p.sum((0, 2, 3)) + truth.sum((0, 2, 3)) + 1)
+    return entropy + 0.5 * dice[1:].mean()
+
+
+def dist_loss(found, dist, sem):
+    """L1 on organs, heavier where another organ is near: that is rare, and it is what separates them."""
+    weight = ((sem > 0) & (sem != IGNORED)).float() * (1 + 4 * dist)
+    return (weight * (found[:, 0] - dist).abs()).sum() / weight.sum().clamp(min=1)
+
+
+def depth_loss(found, log_depth, known, sem):
+    """Variance of the error of log depth (Eigen et al. 2014, eq. 3 with lambda = 1), and L1 on its differences between
+    neighbours, which keeps edges."""
+    weight = known * torch.where((sem > 0) & (sem != IGNORED), 1.0, GROUND_WEIGHT)
+    error = found[:, 0] - log_depth
+    total = weight.sum((1, 2)).clamp(min=1)
+    mean = (weight * error).sum((1, 2)) / total
+    variance = (weight * (error - mean[:, None, None]) ** 2).sum((1, 2)) / total
+    down, right = weight[:, 1:] * weight[:, :-1], weight[:, :, 1:] * weight[:, :, :-1]
+    step = (down * (error[:, 1:] - error[:, :-1]).abs()).sum((1, 2)) + (right * (error[:, :, 1:] - error[:, :, :-1]).abs()).sum((1, 2))
+    return (variance + 0.5 * step / total).mean()
+
+
+class Figures:
+    """Intersection over union of each class, mean absolute error of dist on organs, and the standard deviation of the
+    error of log depth within an image, on organs (mean over the images)."""
+
+    def __init__(self):
+        self.both, self.either = torch.zeros(CLASSES), torch.zeros(CLASSES)
+        self.dist_error, self.organ_pixels, self.spreads = 0.0, 0, []
+
+    def add(self, sem_logits, found_dist, found_depth, sem, dist, log_depth, known):
+        best = sem_logits.argmax(1)
+        for c in range(CLASSES):
+            self.both[c] += ((best == c) & (sem == c)).sum()
+            self.either[c] += ((best == c) | (sem == c)).sum()
+        organ = sem > 0
+        self.dist_error += float((found_dist[:, 0] - dist).abs()[organ].sum())
+        self.organ_pixels += int(organ.sum())
+        for error, here in zip(found_depth[:, 0] - log_depth, organ & (known > 0)):
+            if here.sum() > 1:
+                self.spreads.append(float(error[here].std()))
+
+    def report(self):
+        iou = (self.both / self.either.clamp(min=1)).tolist()
+        names = ("background", "leaf", "stem", "main_stem")
+        figures = {f"iou_{name}": value for name, value in zip(names, iou)}
+        figures["miou"] = sum(iou) / CLASSES
+        figures["dist_mae_on_organs"] = self.dist_error / max(1, self.organ_pixels)
+        figures["log_depth_std_on_organs"] = sum(self.spreads) / max(1, len(self.spreads))
+        return {name: round(value, 4) for name, value in figures.items()}
