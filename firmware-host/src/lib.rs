@@ -8,3 +8,4 @@ pub mod commands;
 pub mod error;
 pub mod output;
 pub mod report;
+pub mod store;

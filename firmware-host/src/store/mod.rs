@@ -1,0 +1,15 @@
+//! The store: one SQLite file that never loses an acknowledged plant (spec/appliance.md "Store").
+//!
+//! [`Store`] writes, one at a time; [`Reader`] reads beside it. Neither knows the pipeline or the page.
+
+mod connection;
+mod error;
+mod plant;
+mod read;
+mod write;
+
+pub use connection::APPLICATION_ID;
+pub use error::StoreError;
+pub use plant::{NewPlant, NewSession};
+pub use read::{Page, PlantRow, Reader, SessionRow, StoredRecord, Summary};
+pub use write::{Saved, Store};

@@ -1,0 +1,90 @@
+//! A store in a temporary folder with a session, a species and a network, and plants to put into it.
+#![allow(dead_code)]
+
+use std::path::PathBuf;
+
+use demeter::report::{Kind, OrganReport, PlantReport, Quantity, Unit};
+use demeter::store::{NewPlant, NewSession, Store};
+use demeter_recon::organs::ScaleSource;
+
+pub(crate) struct Bench {
+    pub(crate) folder: tempfile::TempDir,
+    pub(crate) path: PathBuf,
+    pub(crate) store: Store,
+    pub(crate) species_hash: String,
+}
+
+pub(crate) const MODEL: &str = "ab54d286dfd1a2d5e0c0c7e4b9c1f3c2aabbccddeeff00112233445566778899";
+
+pub(crate) fn bench() -> Bench {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("demeter.sqlite");
+    let store = Store::open(&path).unwrap();
+    let species = demeter_recon::species::shipped("soybean").unwrap().unwrap();
+    store.save_species(&species).unwrap();
+    store.save_model(MODEL, "organ2d").unwrap();
+    let cameras = vec![("nadir".to_owned(), serde_json::json!({"fx": 500.0}))];
+    store.save_session(&NewSession { id: "row".into(), rig: "rig-1".into(), cameras }).unwrap();
+    Bench { folder, path, store, species_hash: species.hash().to_owned() }
+}
+
+impl Bench {
+    /// Plant number `n` with two organs; its height is `n` centimetres.
+    pub(crate) fn plant(&self, n: u32) -> NewPlant {
+        let quantity = |value, unit| Quantity { value, unit, sigma: Some(0.01) };
+        let organ = |id, kind, parent, leaf| OrganReport {
+            id,
+            kind,
+            parent,
+            leaf,
+            points: Some(100),
+            residual: Some(0.002),
+            visible_fraction: Some(0.5),
+            traits: [("stem_length".into(), quantity(0.1, Unit::Metre))].into(),
+        };
+        let record = vec![n as u8; 64];
+        NewPlant {
+            report: PlantReport {
+                id: Some(format!("row-{n:04}")),
+                species: "soybean".into(),
+                species_hash: Some(self.species_hash.clone()),
+                organs: vec![organ(0, Kind::MainStem, None, None), organ(1, Kind::Leaf, Some(0), Some(0))],
+                traits: [
+                    ("height".into(), quantity(f64::from(n) / 100.0, Unit::Metre)),
+                    ("leaf_count".into(), quantity(1.0, Unit::One)),
+                    ("blade_count".into(), quantity(1.0, Unit::One)),
+                    ("leaf_area".into(), quantity(0.003, Unit::SquareMetre)),
+                ]
+                .into(),
+                cd: Some(0.02),
+                bytes: record.len(),
+                scale_source: ScaleSource::GroundPlane,
+                record: None,
+                camera: None,
+                warnings: vec!["one blade was hidden".into()],
+                ms: Some(12.0),
+            },
+            record,
+            session: "row".into(),
+            time: "2026-06-01T10:00:00Z".into(),
+            time_trusted: true,
+            position: Some(glam::DVec3::new(0.25 * f64::from(n), 0.0, 0.0)),
+            geographic: None,
+            models: vec![MODEL.into()],
+            provenance: serde_json::json!({"program": "0.1.0"}),
+            observations: vec![("nadir".into(), u64::from(n)), ("nadir".into(), u64::from(n) + 1)],
+            thumbnail: Some(vec![7; 10]),
+        }
+    }
+
+    /// A number that a query gives, on a connection of its own.
+    pub(crate) fn number(&self, sql: &str) -> i64 {
+        rusqlite::Connection::open(&self.path).unwrap().query_row(sql, [], |row| row.get(0)).unwrap()
+    }
+
+    /// Rows of each table that a plant writes to.
+    pub(crate) fn rows(&self) -> [i64; 5] {
+        ["plants", "organs", "plant_models", "observations", "outbox"]
+            .map(|table| self.number(&format!("SELECT count(*) FROM {table}")))
+    }
+}
