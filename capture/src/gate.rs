@@ -161,11 +161,12 @@ fn sharpness(luma: &image::GrayImage) -> f64 {
     let rows: Vec<&[u8]> = luma.chunks_exact(width.max(1)).collect();
     let (mut sum, mut squares, mut count) = (0i64, 0i64, 0i64);
     for three in rows.windows(3) {
-        for x in 1..width.saturating_sub(1) {
-            let at = |row: usize, x: usize| i64::from(three[row][x]);
-            let laplacian = at(0, x) + at(2, x) + at(1, x - 1) + at(1, x + 1) - 4 * at(1, x);
-            sum += laplacian;
-            squares += laplacian * laplacian;
+        let (above, below) = (&three[0][1..], &three[2][1..]);
+        for ((row, &up), &down) in three[1].windows(3).zip(above).zip(below) {
+            let [left, here, right] = [row[0], row[1], row[2]].map(i32::from);
+            let laplacian = i32::from(up) + i32::from(down) + left + right - 4 * here;
+            sum += i64::from(laplacian);
+            squares += i64::from(laplacian * laplacian);
             count += 1;
         }
     }

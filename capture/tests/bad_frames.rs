@@ -101,6 +101,26 @@ const KINDS: &[(&str, Reason, Bad)] = &[
         }),
     ),
     (
+        "an end inside the scan",
+        Reason::DamagedImage,
+        Bad::Frame(|f, _| {
+            spoil_bytes(f, |b| {
+                let half = b.len() / 2;
+                b[half..half + 2].copy_from_slice(&[0xff, 0xd9]);
+            })
+        }),
+    ),
+    (
+        "half a JPEG with an end",
+        Reason::DamagedImage,
+        Bad::Frame(|f, _| {
+            spoil_bytes(f, |b| {
+                b.truncate(b.len() / 2);
+                b.extend([0xff, 0xd9]);
+            })
+        }),
+    ),
+    (
         "broken Huffman table",
         Reason::DamagedImage,
         Bad::Frame(|f, _| {
