@@ -155,6 +155,15 @@ fn broken_poses_cost_the_pose_only() {
 }
 
 #[test]
+fn a_poses_file_of_garbage_is_refused_within_bounds() {
+    let folder = tempfile::tempdir().expect("a folder");
+    record(folder.path(), &[frame(1)]);
+    fs::write(folder.path().join("poses.jsonl"), "garbage\n".repeat(2000)).expect("writes");
+    let refused = Replay::open(folder.path(), Pace::Max);
+    assert!(matches!(refused, Err(SessionError::Poses { what: "broken lines", .. })), "{refused:?}");
+}
+
+#[test]
 fn the_real_pace_gives_the_same_frames_and_cuts_forged_pauses() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut late = frame(3);
@@ -195,6 +204,7 @@ fn broken_manifests_name_the_key() {
         ("t = [0.0, 0.0, 0.0]", "t = [0.0, nan, 0.0]", "rig_from_camera"),
         ("plant_spacing_m = 0.06", "plant_spacing_m = 0.0", "rows[0].plant_spacing_m"),
         ("row = \"12\"", "row = \"\"", "rows[0].row"),
+        ("row = \"12\"", "row = \"1\\n2\"", "rows[0].row"),
     ];
     for (from, to, key) in edits {
         assert!(good.contains(from), "{from} is in\n{good}");

@@ -39,12 +39,14 @@ pub enum SessionError {
         /// The folder.
         path: PathBuf,
     },
-    /// More poses than a session has frames.
-    #[error("{}: expected at most {limit} lines", path.display())]
-    TooManyPoses {
+    /// poses.jsonl holds more poses than a session has frames, or little but broken lines.
+    #[error("{}: expected at most {limit} {what}, found more", path.display())]
+    Poses {
         /// The poses.jsonl.
         path: PathBuf,
-        /// Lines that are read.
+        /// Poses, or broken lines.
+        what: &'static str,
+        /// How many are held.
         limit: usize,
     },
     /// A frame that no reader would take back.

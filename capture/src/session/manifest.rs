@@ -170,9 +170,9 @@ impl SessionCamera {
 
 impl Row {
     fn check(&self, key: &str) -> Result<(), ManifestError> {
-        is_id(&format!("{key}.row"), &self.row)?;
+        is_name(&format!("{key}.row"), &self.row)?;
         if let Some(plot) = &self.plot {
-            is_id(&format!("{key}.plot"), plot)?;
+            is_name(&format!("{key}.plot"), plot)?;
         }
         is_length(&format!("{key}.plant_spacing_m"), self.plant_spacing_m)
     }
@@ -187,6 +187,14 @@ fn is_id(key: &str, id: &str) -> Result<(), ManifestError> {
             "1 to 64 bytes of letters, digits, '-', '_' and '.', not first a '.'",
             format!("{id:?}"),
         ));
+    }
+    Ok(())
+}
+
+/// Rows and plots are named by people, who use spaces and slashes.
+fn is_name(key: &str, name: &str) -> Result<(), ManifestError> {
+    if name.trim().is_empty() || name.len() > 64 || name.chars().any(char::is_control) {
+        return Err(value(key, "1 to 64 bytes of text in one line", format!("{name:?}")));
     }
     Ok(())
 }

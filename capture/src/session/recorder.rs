@@ -41,9 +41,9 @@ impl Recorder {
         let recorder =
             Self { index: Log::create(folder.join(INDEX))?, poses: None, folder: folder.to_owned(), manifest };
         // session.toml comes last and whole: a folder that has it is a session.
-        let mut log = Log::create(folder.join(MANIFEST))?;
-        log.append(text.as_bytes())?;
-        log.sync()?;
+        let unnamed = folder.join("session.toml.new");
+        fs::write(&unnamed, text).and_then(|()| File::open(&unnamed)?.sync_all()).map_err(io)?;
+        fs::rename(unnamed, folder.join(MANIFEST)).map_err(io)?;
         Ok(recorder)
     }
 

@@ -18,6 +18,9 @@ const MAX_MANIFEST_BYTES: u64 = 1 << 20;
 /// Poses held in memory: ten hours of two cameras at 15 frames a second, about 150 MB.
 const MAX_POSES: usize = 1 << 20;
 
+/// Broken lines of poses.jsonl told one by one; each may hold a line, 4 MB in all. More, and the file is something else.
+const MAX_POSE_FAULTS: usize = 1000;
+
 /// The longest wait between two frames at [`Pace::Real`]: a recorded pause, or a forged stamp, is cut to it.
 const MAX_WAIT: Duration = Duration::from_secs(1);
 
@@ -85,8 +88,11 @@ impl Replay {
     fn read_poses(&mut self, mut lines: Lines) -> Result<(), SessionError> {
         let path = || self.root.join(POSES);
         while let Some(line) = lines.next::<PoseLine>().map_err(|source| SessionError::Io { path: path(), source })? {
-            if self.poses.len() + self.pose_faults.len() >= MAX_POSES {
-                return Err(SessionError::TooManyPoses { path: path(), limit: MAX_POSES });
+            if self.poses.len() >= MAX_POSES {
+                return Err(SessionError::Poses { path: path(), what: "poses", limit: MAX_POSES });
+            }
+            if self.pose_faults.len() >= MAX_POSE_FAULTS {
+                return Err(SessionError::Poses { path: path(), what: "broken lines", limit: MAX_POSE_FAULTS });
             }
             let known = line.and_then(PoseLine::checked).and_then(|line| {
                 let PoseLine { camera, seq, world_from_camera } = line;

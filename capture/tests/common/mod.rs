@@ -66,6 +66,6 @@ pub(crate) fn manifest() -> Manifest {
         session_id: "session-1".into(),
         species: "soybean".into(),
         cameras: vec![camera("left"), camera("right")],
-        rows: vec![Row { row: "12".into(), plot: Some("A-3".into()), plant_spacing_m: Some(0.06) }],
+        rows: vec![Row { row: "12".into(), plot: Some("Süd 3/4".into()), plant_spacing_m: Some(0.06) }],
     }
 }
