@@ -2,7 +2,7 @@ use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use ndarray::{Array4, ArrayView4};
+use ndarray::{Array, Array4, ArrayView4, IxDyn};
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::value::{Outlet, TensorRef, ValueType};
@@ -70,13 +70,14 @@ impl Model {
         let tensor = TensorRef::from_array_view(input.view()).map_err(failed)?;
         let outputs = self.session.run(ort::inputs![tensor]).map_err(failed)?;
         let array = |(port, value): (&Port, ort::value::ValueRef<'_>)| {
-            let values = value.try_extract_array::<f32>().map_err(failed)?;
+            let (shape, values) = value.try_extract_tensor::<f32>().map_err(failed)?;
+            let shape: Vec<usize> = shape.iter().map(|&side| side as usize).collect();
             let output = port.name.clone();
-            if let Some((index, &found)) = values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
-                return Err(ModelError::NotFinite { name: name.clone(), output, found, index });
+            if let Some(index) = values.iter().position(|value| !value.is_finite()) {
+                return Err(ModelError::NotFinite { name: name.clone(), output, found: values[index], index });
             }
-            let shape = values.shape().to_vec();
-            values.to_owned().into_dimensionality().map_err(|_wrong_rank| ModelError::Shape {
+            let array = Array::from_shape_vec(IxDyn(&shape), values.to_vec()).and_then(Array::into_dimensionality);
+            array.map_err(|_wrong_rank| ModelError::Shape {
                 name: name.clone(),
                 output,
                 expected: input.shape().to_vec(),

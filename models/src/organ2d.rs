@@ -108,13 +108,11 @@ impl Organ2d {
                 return Err(ModelError::Shape { name, output: port.name, expected, found });
             }
         }
-        let mut sem = found[0].slice(s![0, .., .., ..]).to_owned();
-        for mut pixel in sem.lanes_mut(Axis(0)) {
-            let largest = pixel.fold(f32::NEG_INFINITY, |a, &b| a.max(b));
-            pixel.mapv_inplace(|logit| (logit - largest).exp());
-            let sum = pixel.sum();
-            pixel.mapv_inplace(|p| p / sum);
-        }
+        // Softmax; the largest logit is taken off first so that nothing overflows.
+        let mut sem = found[0].index_axis(Axis(0), 0).to_owned();
+        sem -= &sem.fold_axis(Axis(0), f32::NEG_INFINITY, |&a, &b| a.max(b));
+        sem.mapv_inplace(f32::exp);
+        sem /= &sem.sum_axis(Axis(0));
         Ok(OrganMaps {
             probabilities: Semantic::ALL.map(|class| raster(sem.index_axis(Axis(0), class as usize))),
             dist: raster(found[1].slice(s![0, 0, .., ..])),
@@ -157,15 +155,22 @@ fn tensor(image: &Rgb, w: u32, h: u32) -> Array4<f32> {
         resized = resize(image, w, h, FilterType::Triangle);
         &resized
     };
-    let raw = image.as_raw();
-    Array4::from_shape_fn((1, 3, h as usize, w as usize), |(_, c, y, x)| {
-        f32::from(raw[(y * w as usize + x) * 3 + c]) / 255.0
-    })
+    let mut tensor = Array4::zeros((1, 3, h as usize, w as usize));
+    for (channel, mut plane) in tensor.index_axis_mut(Axis(0), 0).outer_iter_mut().enumerate() {
+        for (value, pixel) in plane.iter_mut().zip(image.pixels()) {
+            *value = f32::from(pixel.0[channel]) / 255.0;
+        }
+    }
+    tensor
 }
 
 fn raster(values: ArrayView2<'_, f32>) -> ImageBuffer<Luma<f32>, Vec<f32>> {
     let (height, width) = values.dim();
-    ImageBuffer::from_fn(width as u32, height as u32, |x, y| Luma([values[[y as usize, x as usize]]]))
+    let mut raster = ImageBuffer::new(width as u32, height as u32);
+    for (to, from) in raster.iter_mut().zip(values) {
+        *to = *from;
+    }
+    raster
 }
 
 #[cfg(test)]
