@@ -61,5 +61,6 @@ def write_manifest(path, version, provenance):
         f'inputs = {ports(["image"])}\noutputs = {ports(["sem", "dist", "depth"])}\n\n'
         f'[provenance]\ncommand = {json.dumps(provenance["command"])}\nseed = {provenance["seed"]}\n'
         f'steps = {provenance["steps"]}\nprogram = {json.dumps(provenance["program"])}\n'
-        f"data = [\n{data}\n]\n\n# On the last 3 % of each data set, which were not trained on.\n[provenance.figures]\n{figures}\n"
+        f"data = [\n{data}\n]\n\n"
+        f"# On the last 3 % of each data set, which were not trained on.\n[provenance.figures]\n{figures}\n"
     )

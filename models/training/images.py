@@ -1,8 +1,8 @@
 """Labelled images as `demeter synth images` writes them, and the randomisation they go through.
 
 A folder holds meta.json and, for n images of h x w pixels, raw row-major arrays: rgb.u8 [n, h, w, 3]; sem.u8 [n, h, w]
-(0 background, 1 leaf, 2 stem, 3 main stem); dist.u8 [n, h, w], truncated inverse distance to the nearest pixel of another
-organ, times 255; depth.u16 [n, h, w], 0 for none, else 1 + 65534 (ln z - ln 0.05) / (ln 50 - ln 0.05), z in metres.
+(0 background, 1 leaf, 2 stem, 3 main stem); dist.u8 [n, h, w], truncated inverse distance to the nearest pixel of
+another organ, times 255; depth.u16 [n, h, w], 0 for none, else 1 + 65534 (ln z - ln 0.05) / (ln 50 - ln 0.05), z in metres.
 """
 
 import hashlib
@@ -56,8 +56,8 @@ class Folder:
         """Image i as (rgb, sem, dist 0..1, log depth or 0, where depth is known), all [h, w] but rgb [h, w, 3] u8."""
         known = self.depth[i] > 0
         log_depth = LOG_NEAR + (self.depth[i].astype(np.float32) - 1) / 65534 * (LOG_FAR - LOG_NEAR)
-        dist = self.dist[i].astype(np.float32) / 255
-        return np.array(self.rgb[i]), np.array(self.sem[i]), dist, np.where(known, log_depth, 0).astype(np.float32), known
+        log_depth = np.where(known, log_depth, 0).astype(np.float32)
+        return np.array(self.rgb[i]), np.array(self.sem[i]), self.dist[i].astype(np.float32) / 255, log_depth, known
 
 
 def tensors(rgb, sem, dist, log_depth, known):
@@ -102,8 +102,8 @@ def randomised(random, rgb, sem, dist, log_depth, known):
 
 
 def cropped(random, rgb, sem, dist, log_depth, known):
-    """A square window brought to SIDE pixels, 0.7 to 1.5 times as large; what lies outside the picture is a mirror image
-    whose labels are ignored."""
+    """A square window brought to SIDE pixels, 0.7 to 1.5 times as large; what lies outside the picture is a mirror
+    image whose labels are ignored."""
     scale = np.exp(random.uniform(np.log(0.7), np.log(1.5)))
     side = int(round(SIDE / scale))
     height, width = sem.shape

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """Paints what a checkpoint of organ2d sees in photos: photo, classes, boundaries and depth side by side, to look at.
 
-Where plants stand before a light wall, a threshold on colour gives a mask to compare with (`--before-light`): its figure
-is a sanity check on real photos, not truth, and never training data.
+Where plants stand before a light wall, a threshold on colour gives a mask to compare with (`--before-light`): its
+figure is a sanity check on real photos, not truth, and never training data.
 """
 
 import argparse
@@ -36,7 +36,7 @@ def main():
     parser.add_argument("checkpoint", type=pathlib.Path)
     parser.add_argument("images", nargs="+", type=pathlib.Path)
     parser.add_argument("-o", "--out", type=pathlib.Path)
-    parser.add_argument("--before-light", action="store_true", help="compare with green above the lowest sixth (the pot)")
+    parser.add_argument("--before-light", action="store_true", help="compare with green, above the pot")
     args = parser.parse_args()
     torch.set_num_threads(1)
     network = Organ2d().eval()
@@ -56,11 +56,12 @@ def main():
             plant = best > 0
             near, far = (depth[0][plant].min(), depth[0][plant].max()) if plant.any() else (0, 1)
             relative = np.where(plant, 255 - 200 * (depth[0] - near) / max(far - near, 1e-6), 0)
-            grey = [np.repeat(plane[..., None].clip(0, 255).astype(np.uint8), 3, -1) for plane in (dist[0] * 255 * plant, relative)]
+            grey = np.stack([dist[0] * 255 * plant, relative])[..., None].clip(0, 255).astype(np.uint8).repeat(3, -1)
             row = Image.fromarray(np.concatenate([rgb, COLOURS[best], *grey], axis=1))
             rows.append(row.resize((1200, max(1, row.height * 1200 // row.width))))
     if overlaps:
-        print(f"IoU with the colour threshold: mean {np.mean(overlaps):.3f}, median {np.median(overlaps):.3f}, worst {min(overlaps):.3f}, {len(overlaps)} photos")
+        figures = f"mean {np.mean(overlaps):.3f}, median {np.median(overlaps):.3f}, worst {min(overlaps):.3f}"
+        print(f"IoU with the colour threshold: {figures}, {len(overlaps)} photos")
     if args.out:
         sheet = Image.new("RGB", (1200, sum(row.height for row in rows)))
         top = 0

@@ -38,8 +38,9 @@ def depth_loss(found, log_depth, known, sem):
     mean = (weight * error).sum((1, 2)) / total
     variance = (weight * (error - mean[:, None, None]) ** 2).sum((1, 2)) / total
     down, right = weight[:, 1:] * weight[:, :-1], weight[:, :, 1:] * weight[:, :, :-1]
-    step = (down * (error[:, 1:] - error[:, :-1]).abs()).sum((1, 2)) + (right * (error[:, :, 1:] - error[:, :, :-1]).abs()).sum((1, 2))
-    return (variance + 0.5 * step / total).mean()
+    step_down = (down * (error[:, 1:] - error[:, :-1]).abs()).sum((1, 2))
+    step_right = (right * (error[:, :, 1:] - error[:, :, :-1]).abs()).sum((1, 2))
+    return (variance + 0.5 * (step_down + step_right) / total).mean()
 
 
 class Figures:

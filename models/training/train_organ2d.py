@@ -29,14 +29,15 @@ WARM_UP_STEPS = 100
 SAVE_EVERY_SECS = 60
 AVERAGED = 0.998
 MODELS = pathlib.Path(__file__).resolve().parent.parent
+CHECKPOINTS = MODELS.parent / ".cache/training/organ2d"
 
 
 def arguments():
     parser = argparse.ArgumentParser(description="Trains organ2d and writes organ2d.onnx, its manifest and its pins.")
-    parser.add_argument("--data", action="append", default=[], metavar="DIR", help="from `demeter synth images`; repeat")
+    parser.add_argument("--data", action="append", default=[], metavar="DIR", help="of `demeter synth images`")
     parser.add_argument("--minutes", type=float, default=55.0, help="time for this run, over all its restarts")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--work", type=pathlib.Path, default=MODELS.parent / ".cache/training/organ2d", help="checkpoints")
+    parser.add_argument("--work", type=pathlib.Path, default=CHECKPOINTS, help="where checkpoints go")
     parser.add_argument("--from", dest="start", type=pathlib.Path, metavar="FILE", help="begin with these weights")
     parser.add_argument("--out", type=pathlib.Path, default=MODELS, help="where organ2d.onnx goes")
     parser.add_argument("--version", default="1", help="the manifest's version")
@@ -79,8 +80,8 @@ class Run:
 
     def save(self, path):
         """Whole or not at all: written beside, then renamed."""
-        state = {"network": self.network.state_dict(), "average": self.average.state_dict(), "step": self.step}
-        state |= {"optimiser": self.optimiser.state_dict(), "seconds": self.seconds, "earlier_steps": self.earlier_steps}
+        state = {"step": self.step, "seconds": self.seconds, "earlier_steps": self.earlier_steps}
+        state |= {name: getattr(self, name).state_dict() for name in ("network", "average", "optimiser")}
         torch.save(state, path.with_suffix(".part"))
         os.replace(path.with_suffix(".part"), path)
 
@@ -99,7 +100,8 @@ class Run:
         with torch.cpu.amp.autocast():
             outputs = self.network(image.to(memory_format=torch.channels_last))
         logits, found_dist, found_depth = (output.float() for output in outputs)
-        parts = (semantic_loss(logits, sem), dist_loss(found_dist, dist, sem), depth_loss(found_depth, log_depth, known, sem))
+        parts = [semantic_loss(logits, sem), dist_loss(found_dist, dist, sem)]
+        parts.append(depth_loss(found_depth, log_depth, known, sem))
         loss = sum(parts)
         self.optimiser.zero_grad()
         loss.backward()
@@ -127,9 +129,8 @@ def train(run, samples, seconds, most_steps, checkpoint):
         now = time.monotonic()
         run.seconds, last = run.seconds + now - last, now
         if run.step % 50 == 0:
-            sem, dist, depth = sums / 50
+            print(f"step {run.step}, {run.seconds:.0f} s: sem, dist, depth {(sums / 50).round(4)}", flush=True)
             sums[:] = 0
-            print(f"step {run.step} at {run.seconds:.0f} s: sem {sem:.4f} dist {dist:.4f} depth {depth:.4f}", flush=True)
         over = run.seconds >= seconds or run.step >= most_steps
         if over or now - saved > SAVE_EVERY_SECS:
             run.save(checkpoint)
@@ -178,7 +179,8 @@ def main():
         "steps": run.earlier_steps + run.step,
         "program": f"train_organ2d.py, PyTorch {torch.__version__}, NumPy {np.__version__}",
         "data": [
-            {"images": f.meta["count"], "seed": f.meta["seed"], "program": f.meta["program"], "sha256": f.sha256()} for f in folders
+            {"images": f.meta["count"], **{key: f.meta[key] for key in ("seed", "program")}, "sha256": f.sha256()}
+            for f in folders
         ],
         "figures": {} if args.smoke else judge(network, folders),
     }
