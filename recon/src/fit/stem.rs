@@ -10,6 +10,9 @@ use crate::model::stem::{POINTS, gauge};
 
 /// Slices of a stem's course: as many as control points would leave slices empty on short stems.
 const SLICES: usize = 12;
+/// The distance to the axis below which this share of the points lies is the radius: on a clean scan every share says
+/// the same, and points of neighbouring organs lie outside.
+const RADIUS_QUANTILE: f64 = 0.25;
 
 /// A fitted stem in the world; its base is where it was told to be.
 #[derive(Clone, Debug)]
@@ -87,7 +90,7 @@ pub(super) fn fit_path(path: &[DVec3], points: &[DVec3], species: &Species) -> S
     let raw = species.stem.jacobian(&state.gamma).points;
     let axis: Vec<DVec3> = raw.iter().map(|p| base + state.rotation * (*p * s)).collect();
     let offsets: Vec<f64> = points.iter().map(|p| distance_to_path(*p, &axis)).collect();
-    let radius = ranges.stem_radius.clamp(median(offsets.clone()).unwrap_or(ranges.stem_radius.min));
+    let radius = ranges.stem_radius.clamp(quantile(offsets.clone(), RADIUS_QUANTILE).unwrap_or(ranges.stem_radius.min));
     let residual = mean(offsets.iter().map(|d| (d - radius).abs()));
     let rotation = (state.rotation * gauge(&raw).inverse()).normalize();
     StemFit { rotation, length: s, gamma: state.gamma, radius, residual, converged }
@@ -111,9 +114,13 @@ pub(super) fn nearest_on(p: DVec3, a: DVec3, b: DVec3) -> (f64, DVec3) {
 }
 
 /// Median, `None` of nothing.
-pub(crate) fn median(mut x: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(x: Vec<f64>) -> Option<f64> {
+    quantile(x, 0.5)
+}
+
+fn quantile(mut x: Vec<f64>, share: f64) -> Option<f64> {
     x.sort_by(f64::total_cmp);
-    x.get(x.len() / 2).copied()
+    x.get((x.len() as f64 * share) as usize).copied()
 }
 
 /// Mean, 0 of nothing.

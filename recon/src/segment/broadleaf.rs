@@ -5,7 +5,7 @@ use glam::DVec3;
 use nalgebra::Matrix3;
 
 use super::{MIN_ORGAN_POINTS, grain, ground_point, organ, split_stems};
-use crate::graph::pieces;
+use crate::graph::{CloudGraph, pieces, prune, skeleton};
 use crate::model::OrganKind;
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
@@ -15,6 +15,10 @@ use crate::organs::OrganCloud;
 const SCALE_SHARE: f64 = 0.025;
 /// Second over first standard deviation of a neighbourhood below which it is a stem.
 const STEM_FLATNESS: f64 = 0.42;
+/// Third over second standard deviation of a neighbourhood above which it is a thicket of stems and not a blade.
+const LEAF_THICKNESS: f64 = 0.45;
+/// A path within a cluster of blades that is at least this share of its longest is a blade of its own.
+const LEAFLET_SHARE: f64 = 0.4;
 /// Cosine of the largest angle between neighbouring normals of one leaf (35°).
 const SAME_LEAF_COSINE: f64 = 0.82;
 /// Neighbours whose votes smooth the classes.
@@ -22,10 +26,11 @@ const VOTERS: usize = 15;
 
 pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
     let search = Nearest::of(points);
-    let grain = grain(points, &search);
+    let grain = grain(points, &search, 10);
     let radius = (SCALE_SHARE * crate::cloud::diagonal(points).unwrap_or(0.0)).max(2.0 * grain);
-    let shapes: Vec<(f64, DVec3)> = points.iter().map(|p| neighbourhood(points, &search, *p, radius)).collect();
-    let mut is_stem: Vec<bool> = shapes.iter().map(|(flatness, _)| *flatness < STEM_FLATNESS).collect();
+    let shapes: Vec<Neighbourhood> = points.iter().map(|p| neighbourhood(points, &search, *p, radius)).collect();
+    let mut is_stem: Vec<bool> =
+        shapes.iter().map(|n| n.flatness < STEM_FLATNESS || n.thickness > LEAF_THICKNESS).collect();
     let near: Vec<Vec<usize>> =
         points.iter().map(|p| search.k(*p, VOTERS).into_iter().map(|n| n.index).collect()).collect();
     for _ in 0..2 {
@@ -39,7 +44,8 @@ pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
     let shapes = &shapes;
     let joined = |i: usize| {
         near[i].iter().copied().filter(move |j| {
-            points[i].distance(points[*j]) < 2.5 * grain && shapes[i].1.dot(shapes[*j].1).abs() > SAME_LEAF_COSINE
+            points[i].distance(points[*j]) < 2.5 * grain
+                && shapes[i].normal.dot(shapes[*j].normal).abs() > SAME_LEAF_COSINE
         })
     };
     let clusters = pieces(points.len(), joined, |i| !is_stem[i]);
@@ -48,12 +54,26 @@ pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
     let stems: Vec<usize> = (0..points.len()).filter(|i| is_stem[*i]).collect();
     let (leaves, stems) = adopt(points, leaves, stems, crumbs.concat());
     let mut organs = split_stems(points, &stems, up);
-    organs.extend(leaves.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
+    let stem_points: Vec<DVec3> = stems.iter().map(|i| points[*i]).collect();
+    let stem_search = Nearest::of(&stem_points);
+    for cluster in leaves {
+        let blades = split_blades(points, cluster, &stem_search, grain);
+        organs.extend(blades.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
+    }
     organs
 }
 
-/// Second over first standard deviation of the points about `p`, and the normal of their plane.
-fn neighbourhood(points: &[DVec3], search: &Nearest, p: DVec3, radius: f64) -> (f64, DVec3) {
+/// The shape of a cloud around a point.
+struct Neighbourhood {
+    /// Second over first standard deviation: 0 a line, 1 a disc.
+    flatness: f64,
+    /// Third over second: 0 a sheet, 1 a thicket.
+    thickness: f64,
+    /// Unit normal of the best plane, either way.
+    normal: DVec3,
+}
+
+fn neighbourhood(points: &[DVec3], search: &Nearest, p: DVec3, radius: f64) -> Neighbourhood {
     let mut found = search.within(p, radius);
     if found.len() < 8 {
         found = search.k(p, 8);
@@ -71,7 +91,24 @@ fn neighbourhood(points: &[DVec3], search: &Nearest, p: DVec3, radius: f64) -> (
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
     let sd = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
     let normal = eigen.eigenvectors.column(order[2]);
-    (sd[1] / sd[0].max(1e-12), DVec3::new(normal[0], normal[1], normal[2]))
+    Neighbourhood {
+        flatness: sd[1] / sd[0].max(1e-12),
+        thickness: sd[2] / sd[1].max(1e-12),
+        normal: DVec3::new(normal[0], normal[1], normal[2]),
+    }
+}
+
+/// Takes apart blades that touch at their bases: seen along the cluster from where it meets its stem, each is a path
+/// of its own.
+fn split_blades(points: &[DVec3], members: Vec<usize>, stems: &Nearest, grain: f64) -> Vec<Vec<usize>> {
+    let own: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
+    let from_stem = |i: usize| stems.one(own[i]).map_or(f64::INFINITY, |n| n.distance_squared);
+    let base = (0..own.len()).fold(0, |best, i| if from_stem(i) < from_stem(best) { i } else { best });
+    let graph = CloudGraph::new(&own);
+    let reach = graph.distances(&[base]).into_iter().fold(0.0, f64::max);
+    let branches = skeleton(&own, &graph, base, 1.5 * grain, |_, length| length);
+    let blades = prune(branches, &own, LEAFLET_SHARE * reach);
+    blades.into_iter().map(|b| b.members.into_iter().map(|i| members[i]).collect()).collect()
 }
 
 /// Gives each crumb's points to the nearest leaf or stem.

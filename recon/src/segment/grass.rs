@@ -13,7 +13,7 @@ use crate::organs::OrganCloud;
 const LEAF_SHARE: f64 = 0.06;
 
 pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
-    let grain = grain(points, &Nearest::of(points));
+    let grain = grain(points, &Nearest::of(points), 10);
     let diagonal = crate::cloud::diagonal(points).unwrap_or(0.0);
     let graph = CloudGraph::new(points);
     let base = ground_point(points, up);

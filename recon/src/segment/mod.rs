@@ -108,10 +108,10 @@ fn organ(points: &[DVec3], kind: OrganKind, mut members: Vec<usize>) -> OrganClo
     }
 }
 
-/// Mean distance to the tenth neighbour (its median over a sample): the cloud's grain, metres.
-fn grain(points: &[DVec3], search: &Nearest) -> f64 {
+/// Distance to the `k`-th neighbour, its median over a sample, metres: the cloud's grain.
+fn grain(points: &[DVec3], search: &Nearest, k: usize) -> f64 {
     let stride = points.len().div_ceil(2_000).max(1);
-    let gaps = points.iter().step_by(stride).filter_map(|p| search.k(*p, 11).last().map(|n| n.distance())).collect();
+    let gaps = points.iter().step_by(stride).filter_map(|p| search.k(*p, k + 1).last().map(|n| n.distance())).collect();
     median_of(gaps).unwrap_or(0.0).max(1e-6)
 }
 
@@ -124,7 +124,8 @@ fn ground_point(points: &[DVec3], up: DVec3) -> usize {
 fn split_stems(points: &[DVec3], members: &[usize], up: DVec3) -> Vec<OrganCloud> {
     let own: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
     let graph = CloudGraph::new(&own);
-    let grain = grain(&own, &Nearest::of(&own));
+    // The third neighbour, because stems of sparse scans are single rows of points.
+    let grain = grain(&own, &Nearest::of(&own), 3);
     let base = ground_point(&own, up);
     let branches = crate::graph::skeleton(&own, &graph, base, 2.0 * grain, |centre, _| centre.dot(up));
     let kept = crate::graph::prune(branches, &own, 4.0 * grain);
