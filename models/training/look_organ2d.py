@@ -25,10 +25,11 @@ def working_image(path):
     return image.resize([max(1, round(side * scale / 16)) * 16 for side in image.size], Image.BILINEAR)
 
 
-def green(rgb):
-    """Excess green (Woebbecke et al. 1995) of chromatic coordinates above 0.06 (tuned by eye)."""
+def green_or_dark(rgb):
+    """Excess green (Woebbecke et al. 1995) of chromatic coordinates above 0.06, or no channel above 0.55: what a plant
+    is before a light wall. Both tuned by eye."""
     share = rgb / np.maximum(rgb.sum(-1, keepdims=True), 1)
-    return 2 * share[..., 1] - share[..., 0] - share[..., 2] > 0.06
+    return (2 * share[..., 1] - share[..., 0] - share[..., 2] > 0.06) | (rgb.max(-1) < 0.55 * 255)
 
 
 def main():
@@ -36,7 +37,7 @@ def main():
     parser.add_argument("checkpoint", type=pathlib.Path)
     parser.add_argument("images", nargs="+", type=pathlib.Path)
     parser.add_argument("-o", "--out", type=pathlib.Path)
-    parser.add_argument("--before-light", action="store_true", help="compare with green, above the pot")
+    parser.add_argument("--before-light", action="store_true", help="compare with what is green or dark above the pot")
     args = parser.parse_args()
     torch.set_num_threads(1)
     network = Organ2d().eval()
@@ -49,8 +50,8 @@ def main():
             logits, dist, depth = (output[0].numpy() for output in network(image))
         best = logits.argmax(0)
         if args.before_light:
-            above = slice(0, rgb.shape[0] * 5 // 6)
-            plant, mask = best[above] > 0, green(rgb.astype(np.float32))[above]
+            above = slice(0, rgb.shape[0] * 15 // 16)
+            plant, mask = best[above] > 0, green_or_dark(rgb.astype(np.float32))[above]
             overlaps.append((plant & mask).sum() / max(1, (plant | mask).sum()))
         if args.out:
             plant = best > 0
