@@ -1,15 +1,19 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup demo check fmt bench
+.PHONY: setup build demo check fmt bench train
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
+IMAGES := .cache/training/images
 
 # Debian packages and ONNX Runtime's library, where missing.
 setup:
 	@tools/setup.sh
 
+# The program. Naming the tests beside it settles one set of features for both, so `make check` reuses every crate.
+build: setup
+	cargo build --locked --bin demeter --package demeter --package demeter-tests
+
 # The bundled session becomes plants in a fresh database, and a picture of the first of them beside its photo.
-demo: setup
-	cargo build --locked --package demeter
+demo: build
 	@rm -rf demo && mkdir demo
 	$(DEMETER) replay tests/fixtures/row --db $(DB)
 	$(DEMETER) plants show first --db $(DB) --picture demo/first-plant.png
@@ -26,3 +30,9 @@ fmt:
 # Times of the hot paths, in the profile that everything else shares.
 bench: setup
 	cargo bench --locked --workspace --profile dev --bench '*'
+
+# Every network of models/ from pictures of the synthetic world: an hour, and the same command resumes a stopped run.
+train: build
+	@tools/setup.sh training
+	test -d $(IMAGES) || { $(DEMETER) synth images --count 12000 --size 256 --seed 1 -o $(IMAGES).new && mv $(IMAGES).new $(IMAGES); }
+	nice -n 3 /usr/bin/python3 models/training/train_organ2d.py --data $(IMAGES) --minutes 55

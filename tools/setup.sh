@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what the build needs and this machine lacks. Run again, it finds everything and downloads nothing.
+# With the argument `training` it also installs what the Python side of models/training needs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -9,6 +10,10 @@ command -v cc >/dev/null || packages+=(build-essential)
 # ONNX Runtime's library comes out of a Python wheel.
 python3 -m pip --version >/dev/null 2>&1 || packages+=(python3-pip)
 [ -e /etc/ssl/certs/ca-certificates.crt ] || packages+=(ca-certificates)
+if [ "${1:-}" = training ]; then
+    /usr/bin/python3 -c 'import torch' 2>/dev/null || packages+=(python3-torch)
+    /usr/bin/python3 -c 'import PIL' 2>/dev/null || packages+=(python3-pil)
+fi
 
 if [ ${#packages[@]} -gt 0 ]; then
     echo "setup: installing ${packages[*]}" >&2
