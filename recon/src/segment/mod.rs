@@ -86,9 +86,9 @@ pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Resu
         (_, Some(own)) => Some(own),
     };
     match own {
-        Some(own) => labelled::segment(&cloud.points, own, up),
+        Some(own) => labelled::segment(&cloud.points, own, habit, up),
         None => {
-            let up = up.resolve(&cloud.points, None);
+            let up = up.resolve(&cloud.points, None, habit);
             let organs = match habit {
                 Habit::Grass => grass::segment(&cloud.points, up),
                 Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, up),
