@@ -129,14 +129,14 @@ impl Data<'_> {
         let surface = self.posed(state, &jacobian.points);
         let normals = grid_normals(&surface);
         let metres = state.log_length.exp();
-        let mut rows = Rows::new(self, state, &jacobian, &surface);
+        let mut pulls = Pulls::new();
         let grid = Nearest::of(&surface);
         // Data to surface: off the edge the whole miss counts, above the blade only its height does.
         let weight = 1.0 / self.points.len() as f64;
         for p in &self.points {
             let Some(Neighbour { index: n, .. }) = grid.one(*p) else { continue };
             let miss = surface[n] - *p;
-            rows.pull(n, miss, (!on_edge(n)).then_some(normals[n]), self.robust(miss) * weight);
+            pulls.add(n, miss, (!on_edge(n)).then_some(normals[n]), self.robust(miss) * weight);
         }
         // Surface to data: where there is data beside it only the height counts, else all of the gap.
         let lookout: Vec<usize> = (1..ROWS)
@@ -148,9 +148,9 @@ impl Data<'_> {
             let Some(found) = self.tree.one(surface[*n]) else { continue };
             let miss = surface[*n] - self.points[found.index];
             let beside = found.distance() < 2.0 * self.spacing;
-            rows.pull(*n, miss, beside.then_some(normals[*n]), self.robust(miss) * weight);
+            pulls.add(*n, miss, beside.then_some(normals[*n]), self.robust(miss) * weight);
         }
-        let mut normal = rows.normal;
+        let mut normal = pulls.linearise(self.base, state, &jacobian, &surface, &normals);
         let prior = (NOISE * metres) / INDEPENDENT;
         for (k, c) in state.beta.iter().chain(&state.gamma).enumerate() {
             normal.prior(4 + k, *c, prior);
@@ -202,49 +202,70 @@ impl Data<'_> {
     }
 }
 
-/// Turns misses into rows of the normal equations: 3 of rotation, ln length, β, γ, ln width.
-struct Rows<'a> {
-    normal: Normal,
-    jacobian: &'a BladeJacobian,
-    rotation: DQuat,
-    base: DVec3,
-    metres: f64,
-    surface: &'a [DVec3],
-    row: Vec<f64>,
+/// Misses summed by grid node: all that pull one node along one direction share a gradient.
+struct Pulls {
+    /// Along each node's normal: sums of weight and of weighted miss.
+    height: Vec<(f64, f64)>,
+    /// In all directions: sums of weight and of weighted miss.
+    whole: Vec<(f64, DVec3)>,
+    cost: f64,
 }
 
-impl<'a> Rows<'a> {
-    fn new(data: &Data<'_>, state: &State, jacobian: &'a BladeJacobian, surface: &'a [DVec3]) -> Self {
-        let parameters = 4 + jacobian.coefficients;
-        Self {
-            normal: Normal::new(parameters),
-            jacobian,
-            rotation: state.rotation,
-            base: data.base,
-            metres: state.log_length.exp(),
-            surface,
-            row: vec![0.0; parameters],
+impl Pulls {
+    fn new() -> Self {
+        Self { height: vec![(0.0, 0.0); POINTS], whole: vec![(0.0, DVec3::ZERO); POINTS], cost: 0.0 }
+    }
+
+    /// Pulls grid node `n` against `miss`, along its normal or in all directions.
+    fn add(&mut self, n: usize, miss: DVec3, normal: Option<DVec3>, weight: f64) {
+        if let Some(normal) = normal {
+            let height = miss.dot(normal);
+            self.height[n].0 += weight;
+            self.height[n].1 += weight * height;
+            self.cost += weight * height * height;
+        } else {
+            self.whole[n].0 += weight;
+            self.whole[n].1 += miss * weight;
+            self.cost += weight * miss.length_squared();
         }
     }
 
-    /// Pulls grid node `n` against `miss`, along one direction or in all three.
-    fn pull(&mut self, n: usize, miss: DVec3, along: Option<DVec3>, weight: f64) {
-        match along {
-            Some(direction) => self.add(n, miss, direction, weight),
-            None => DVec3::AXES.into_iter().for_each(|axis| self.add(n, miss, axis, weight)),
+    /// The normal equations by 3 of rotation, ln length, β, γ, ln width.
+    fn linearise(
+        &self,
+        base: DVec3,
+        state: &State,
+        jacobian: &BladeJacobian,
+        surface: &[DVec3],
+        normals: &[DVec3],
+    ) -> Normal {
+        let k = jacobian.coefficients;
+        let metres = state.log_length.exp();
+        let to_chain = state.rotation.inverse();
+        let mut normal = Normal::new(4 + k);
+        normal.cost = self.cost;
+        let mut row = vec![0.0; 4 + k];
+        let mut add = |n: usize, direction: DVec3, weighted: f64, weight: f64| {
+            let at = surface[n] - base;
+            let turn = at.cross(direction);
+            row[..4].copy_from_slice(&[turn.x, turn.y, turn.z, at.dot(direction)]);
+            let local = to_chain * direction * metres;
+            for (cell, d) in row[4..].iter_mut().zip(&jacobian.derivatives[n * k..(n + 1) * k]) {
+                *cell = d.dot(local);
+            }
+            normal.add_many(weighted, &row, weight);
+        };
+        for (n, up) in normals.iter().enumerate() {
+            let (weight, weighted) = self.height[n];
+            if weight > 0.0 {
+                add(n, *up, weighted, weight);
+            }
+            let (weight, weighted) = self.whole[n];
+            if weight > 0.0 {
+                DVec3::AXES.into_iter().for_each(|axis| add(n, axis, weighted.dot(axis), weight));
+            }
         }
-    }
-
-    fn add(&mut self, n: usize, miss: DVec3, direction: DVec3, weight: f64) {
-        let at = self.surface[n] - self.base;
-        let turn = at.cross(direction);
-        self.row[..4].copy_from_slice(&[turn.x, turn.y, turn.z, at.dot(direction)]);
-        let local = self.rotation.inverse() * direction * self.metres;
-        let k = self.jacobian.coefficients;
-        for (cell, d) in self.row[4..].iter_mut().zip(&self.jacobian.derivatives[n * k..(n + 1) * k]) {
-            *cell = d.dot(local);
-        }
-        self.normal.add(miss.dot(direction), &self.row, weight);
+        normal
     }
 }
 

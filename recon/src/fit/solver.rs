@@ -15,15 +15,20 @@ impl Normal {
         Self { h: DMatrix::zeros(parameters, parameters), g: DVector::zeros(parameters), cost: 0.0 }
     }
 
-    /// Adds `weight * residual²` with its gradient row; only the upper triangle is kept up.
+    /// Adds `weight * residual²` with the residual's gradient.
     pub(super) fn add(&mut self, residual: f64, row: &[f64], weight: f64) {
         self.cost += weight * residual * residual;
+        self.add_many(weight * residual, row, weight);
+    }
+
+    /// Adds residuals that share a gradient: the sums of `weight * residual` and of `weight`. Their cost is the
+    /// caller's to add. Only the upper triangle is kept up.
+    pub(super) fn add_many(&mut self, weighted: f64, row: &[f64], weight: f64) {
         for (j, rj) in row.iter().enumerate() {
+            self.g[j] += weighted * rj;
             let scaled = weight * rj;
-            self.g[j] += scaled * residual;
-            let mut column = self.h.column_mut(j);
-            for (i, ri) in row[..=j].iter().enumerate() {
-                column[i] += scaled * ri;
+            for (cell, ri) in self.h.column_mut(j).iter_mut().zip(&row[..=j]) {
+                *cell += scaled * ri;
             }
         }
     }

@@ -2,7 +2,8 @@
 
 use glam::{DQuat, DVec3};
 
-/// A frame at the end of a bone with its derivatives by K coefficients.
+/// A frame at the end of a bone with its derivatives by two kinds of coefficients: those that change bones and those
+/// that change angles.
 ///
 /// Rotation derivatives are angular velocities ω_k in the organ's frame (dF = [ω_k]× F), translation derivatives are
 /// velocities: propagating both along the chain gives every control point's Jacobian in one pass.
@@ -10,37 +11,46 @@ use glam::{DQuat, DVec3};
 pub(super) struct Joint {
     pub frame: DQuat,
     pub point: DVec3,
-    pub spin: Vec<DVec3>,
-    pub velocity: Vec<DVec3>,
+    /// Velocity by each coefficient that changes bones; those turn nothing.
+    pub slide: Vec<DVec3>,
+    /// Angular velocity and velocity by each coefficient that changes angles.
+    pub swing: Vec<(DVec3, DVec3)>,
 }
 
 impl Joint {
-    pub(super) fn at_origin(coefficients: usize) -> Self {
+    pub(super) fn at_origin(slides: usize, swings: usize) -> Self {
         Self {
             frame: DQuat::IDENTITY,
             point: DVec3::ZERO,
-            spin: vec![DVec3::ZERO; coefficients],
-            velocity: vec![DVec3::ZERO; coefficients],
+            slide: vec![DVec3::ZERO; slides],
+            swing: vec![(DVec3::ZERO, DVec3::ZERO); swings],
         }
     }
 
     /// Turns by the rotation vector `w` (in the current frame) and walks along `bone` (rest direction and length).
-    /// `dw` and `dbone` give the derivatives of both by coefficient k; with no coefficients this is plain kinematics.
+    /// `dbone` and `dw` give the derivatives of both; with no coefficients this is plain kinematics.
     pub(super) fn advance(
         &mut self,
         w: DVec3,
         bone: DVec3,
-        dw: impl Fn(usize) -> DVec3,
         dbone: impl Fn(usize) -> DVec3,
+        dw: impl Fn(usize) -> DVec3,
     ) {
         let before = self.frame;
         self.frame = (before * DQuat::from_scaled_axis(w)).normalize();
         let step = self.frame * bone;
         self.point += step;
+        for (k, velocity) in self.slide.iter_mut().enumerate() {
+            *velocity += self.frame * dbone(k);
+        }
         let left = LeftJacobian::at(w);
-        for k in 0..self.spin.len() {
-            self.spin[k] += before * left.times(dw(k));
-            self.velocity[k] += self.spin[k].cross(step) + self.frame * dbone(k);
+        for (k, (spin, velocity)) in self.swing.iter_mut().enumerate() {
+            let turn = dw(k);
+            // Most coefficients leave most joints alone.
+            if turn != DVec3::ZERO {
+                *spin += before * left.times(turn);
+            }
+            *velocity += spin.cross(step);
         }
     }
 }

@@ -114,7 +114,7 @@ impl LeafModel {
     #[must_use]
     pub fn grid(&self, blade: &Blade) -> BladeGrid {
         let flat = self.flat(&blade.beta, blade.width);
-        let raw = bend(&flat, &self.deform.at(&blade.gamma), 0, |_, _| DVec2::ZERO, |_, _| 0.0).0;
+        let raw = bend(&flat, &self.deform.at(&blade.gamma), (0, 0), |_, _| DVec2::ZERO, |_, _| 0.0).0;
         let gauge = gauge(&raw);
         BladeGrid { points: raw.iter().map(|p| gauge * *p).collect(), gauge }
     }
@@ -129,38 +129,43 @@ impl LeafModel {
         let dflat = |n: usize, k: usize| {
             if k < shapes {
                 DVec2::new(self.shape.derivative(2 * n)[k] * blade.width, self.shape.derivative(2 * n + 1)[k])
-            } else if k == coefficients - 1 {
-                DVec2::new(flat[n].x, 0.0)
             } else {
-                DVec2::ZERO
+                DVec2::new(flat[n].x, 0.0)
             }
         };
-        let dangle = |index: usize, k: usize| {
-            if (shapes..shapes + bends).contains(&k) { self.deform.derivative(index)[k - shapes] } else { 0.0 }
-        };
-        let (points, derivatives) = bend(&flat, &angles, coefficients, dflat, dangle);
+        let dangle = |index: usize, k: usize| self.deform.derivative(index)[k];
+        let (points, derivatives) = bend(&flat, &angles, (shapes + 1, bends), dflat, dangle);
         BladeJacobian { points, derivatives, coefficients }
     }
 }
 
 /// Bends a flat grid: the main vein as one chain, each inner row as two chains that leave it (paper eq. 5).
 ///
-/// Returns points and, for `coefficients` > 0, their derivatives, `[45*43][coefficients]`.
+/// `coefficients` counts those that change the flat grid (β, then ln s_x; `dflat` by node and coefficient) and those
+/// that change angles (γ; `dangle` by angle and coefficient). Returns points and their derivatives
+/// `[45*43][β, γ, ln s_x]`; with no coefficients there are none.
 fn bend(
     flat: &[DVec2],
     angles: &DVector<f64>,
-    coefficients: usize,
+    coefficients: (usize, usize),
     dflat: impl Fn(usize, usize) -> DVec2,
     dangle: impl Fn(usize, usize) -> f64,
 ) -> (Vec<DVec3>, Vec<DVec3>) {
+    let (slides, swings) = coefficients;
     let mut points = vec![DVec3::ZERO; POINTS];
-    let mut derivatives = vec![DVec3::ZERO; POINTS * coefficients];
+    let mut derivatives = vec![DVec3::ZERO; POINTS * (slides + swings)];
     let mut put = |n: usize, joint: &Joint| {
         points[n] = joint.point;
-        derivatives[n * coefficients..(n + 1) * coefficients].copy_from_slice(&joint.velocity);
+        let (shapes, width) = joint.slide.split_at(slides.saturating_sub(1));
+        let bends = joint.swing.iter().map(|(_, velocity)| velocity);
+        let cells = &mut derivatives[n * (slides + swings)..(n + 1) * (slides + swings)];
+        for (cell, velocity) in cells.iter_mut().zip(shapes.iter().chain(bends).chain(width)) {
+            *cell = *velocity;
+        }
     };
     let bone = |to: usize, from: usize| (flat[to] - flat[from]).extend(0.0);
-    let mut vein = Joint::at_origin(coefficients);
+    let mut vein = Joint::at_origin(slides, swings);
+    let mut rib = vein.clone();
     for j in 0..COLUMNS {
         put(node(0, j), &vein);
     }
@@ -169,8 +174,8 @@ fn bend(
         vein.advance(
             DVec3::new(angles[q], 0.0, angles[q + 1]),
             bone(to, from),
-            |k| DVec3::new(dangle(q, k), 0.0, dangle(q + 1, k)),
             |k| (dflat(to, k) - dflat(from, k)).extend(0.0),
+            |k| DVec3::new(dangle(q, k), 0.0, dangle(q + 1, k)),
         );
         put(to, &vein);
         if i == ROWS - 1 {
@@ -181,14 +186,14 @@ fn bend(
             break;
         }
         for side in Side::BOTH {
-            let mut rib = vein.clone();
+            rib.clone_from(&vein);
             for k in 1..=VEIN {
                 let (to, from, q) = (node(i, side.column(k)), node(i, side.column(k - 1)), side_angle(i, side, k));
                 rib.advance(
                     DVec3::new(0.0, angles[q], angles[q + 1]),
                     bone(to, from),
-                    |m| DVec3::new(0.0, dangle(q, m), dangle(q + 1, m)),
                     |m| (dflat(to, m) - dflat(from, m)).extend(0.0),
+                    |m| DVec3::new(0.0, dangle(q, m), dangle(q + 1, m)),
                 );
                 put(to, &rib);
             }

@@ -63,19 +63,19 @@ impl StemModel {
     fn chain(&self, gamma: &[f64], coefficients: usize) -> (Vec<DVec3>, Vec<DQuat>, Vec<DVec3>) {
         let angles = self.deform.at(gamma);
         let bone = DVec3::Y / BONES as f64;
-        let mut joint = Joint::at_origin(coefficients);
+        let mut joint = Joint::at_origin(0, coefficients);
         let (mut points, mut frames) = (vec![joint.point], vec![joint.frame]);
-        let mut derivatives = joint.velocity.clone();
+        let mut derivatives = vec![DVec3::ZERO; coefficients];
         for q in (0..ANGLES).step_by(2) {
             joint.advance(
                 DVec3::new(angles[q], 0.0, angles[q + 1]),
                 bone,
-                |k| DVec3::new(self.deform.derivative(q)[k], 0.0, self.deform.derivative(q + 1)[k]),
                 |_| DVec3::ZERO,
+                |k| DVec3::new(self.deform.derivative(q)[k], 0.0, self.deform.derivative(q + 1)[k]),
             );
             points.push(joint.point);
             frames.push(joint.frame);
-            derivatives.extend_from_slice(&joint.velocity);
+            derivatives.extend(joint.swing.iter().map(|(_, velocity)| *velocity));
         }
         (points, frames, derivatives)
     }
