@@ -14,6 +14,7 @@ pub mod metrics;
 pub mod model;
 pub mod nearest;
 pub mod organs;
+pub mod record;
 pub mod segment;
 pub mod species;
 pub mod tree;

@@ -1,0 +1,115 @@
+//! How far each parameter moves a plant's vertices: what decides its quantum.
+
+use glam::{DQuat, DVec3};
+
+use crate::model::leaf::Blade;
+use crate::model::{Species, stem};
+
+/// Binary logarithms, rounded, of the root-mean-square shift of an organ's control points, in organ sizes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Effects {
+    /// Per σ of each shape coefficient.
+    pub(super) beta: Vec<i32>,
+    /// Per σ of each deformation coefficient of leaves.
+    pub(super) leaf_gamma: Vec<i32>,
+    /// Per σ of each deformation coefficient of stems.
+    pub(super) stem_gamma: Vec<i32>,
+    /// Per unit of ln s_x.
+    pub(super) leaf_width: i32,
+    /// Per radian of a blade's roll about its chord.
+    pub(super) leaf_roll: i32,
+}
+
+impl Effects {
+    /// The effects at the species' mean leaf and stem.
+    pub(super) fn of(species: &Species) -> Self {
+        let mean = Blade { beta: Vec::new(), gamma: Vec::new(), width: 1.0 };
+        let leaf = species.leaf.jacobian(&mean);
+        let gauge = species.leaf.grid(&mean).gauge;
+        let mut shifts = gauged_shifts(&leaf.points, &leaf.derivatives, leaf.coefficients, gauge);
+        let leaf_width = octaves(shifts.pop().unwrap_or(0.0));
+        let roll = leaf.points.iter().map(|p| (gauge * *p).with_y(0.0).length_squared()).sum::<f64>();
+        let leaf_gamma = shifts.split_off(species.leaf.shape.rank());
+        let stem = species.stem.jacobian(&[]);
+        let bows = gauged_shifts(&stem.points, &stem.derivatives, stem.coefficients, stem::gauge(&stem.points));
+        let round = |shifts: Vec<f64>| shifts.into_iter().map(octaves).collect();
+        Self {
+            beta: round(shifts),
+            leaf_gamma: round(leaf_gamma),
+            stem_gamma: round(bows),
+            leaf_width,
+            leaf_roll: octaves((roll / leaf.points.len() as f64).sqrt()),
+        }
+    }
+}
+
+/// The rounded binary logarithm, within what matters.
+fn octaves(shift: f64) -> i32 {
+    shift.max(f64::MIN_POSITIVE).log2().round().clamp(-20.0, 4.0) as i32
+}
+
+/// Root-mean-square shift of the points by each of `coefficients`, after the gauge has taken back what is rotation:
+/// the tip (the last point) goes back to the chord, and the roll to where the points move least.
+fn gauged_shifts(points: &[DVec3], derivatives: &[DVec3], coefficients: usize, gauge: DQuat) -> Vec<f64> {
+    let points: Vec<DVec3> = points.iter().map(|p| gauge * *p).collect();
+    let tip = points.len() - 1;
+    (0..coefficients)
+        .map(|k| {
+            let moved = |n: usize| gauge * derivatives[n * coefficients + k];
+            let chord = points[tip].y.max(1e-3);
+            let back = DVec3::new(-moved(tip).z, 0.0, moved(tip).x) / chord;
+            let shifts: Vec<DVec3> = points.iter().enumerate().map(|(n, p)| moved(n) + back.cross(*p)).collect();
+            let rolling: Vec<DVec3> = points.iter().map(|p| DVec3::Y.cross(*p)).collect();
+            let size: f64 = rolling.iter().map(|r| r.length_squared()).sum();
+            let along: f64 = shifts.iter().zip(&rolling).map(|(s, r)| s.dot(*r)).sum();
+            let roll = if size > 1e-9 { along / size } else { 0.0 };
+            let left: f64 = shifts.iter().zip(&rolling).map(|(s, r)| (*s - *r * roll).length_squared()).sum();
+            (left / points.len() as f64).sqrt()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::species::{NAMES, shipped};
+
+    #[test]
+    fn effects_are_those_of_the_gauged_forms() {
+        for name in NAMES {
+            let species = shipped(name).expect("listed").expect("valid");
+            let effects = Effects::of(&species);
+            for (k, effect) in effects.leaf_gamma.iter().enumerate() {
+                let bent = |c: f64| {
+                    let mut gamma = vec![0.0; k + 1];
+                    gamma[k] = c;
+                    species.leaf.grid(&Blade { beta: Vec::new(), gamma, width: 1.0 }).points
+                };
+                let (a, b) = (bent(0.01), bent(-0.01));
+                let total: f64 = a.iter().zip(&b).map(|(a, b)| ((*a - *b) / 0.02).length_squared()).sum();
+                let found = (total / a.len() as f64).sqrt().log2();
+                // Half an octave by rounding; the rest is the roll, which the gauge takes from the edges alone.
+                assert!((found - f64::from(*effect)).abs() < 1.1, "{name} γ{k}: {found} and {effect}");
+            }
+        }
+    }
+
+    /// The decoder's probabilities hang on these whole numbers, so no machine's rounding may tip them.
+    #[test]
+    fn no_shipped_effect_lies_where_rounding_could_tip_it() {
+        for name in NAMES {
+            let species = shipped(name).expect("listed").expect("valid");
+            let mean = Blade { beta: Vec::new(), gamma: Vec::new(), width: 1.0 };
+            let leaf = species.leaf.jacobian(&mean);
+            let gauge = species.leaf.grid(&mean).gauge;
+            let stem = species.stem.jacobian(&[]);
+            let mut shifts = gauged_shifts(&leaf.points, &leaf.derivatives, leaf.coefficients, gauge);
+            let turn = stem::gauge(&stem.points);
+            shifts.extend(gauged_shifts(&stem.points, &stem.derivatives, stem.coefficients, turn));
+            for shift in shifts.into_iter().filter(|s| *s > 1e-6) {
+                let fraction = shift.log2().rem_euclid(1.0);
+                assert!((fraction - 0.5).abs() > 1e-6, "{name}: {shift}");
+            }
+        }
+    }
+}
