@@ -19,3 +19,4 @@ pub mod segment;
 pub mod species;
 pub mod tree;
 pub mod view;
+pub mod world;

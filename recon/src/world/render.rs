@@ -1,0 +1,134 @@
+use demeter_frame::{Depth, Instances, Intrinsics, Pinhole, Rgb};
+use glam::{Mat3, Vec2, Vec3};
+use image::GrayImage;
+
+use super::raster::{Buffer, NONE};
+use super::scene::Scene;
+use super::shade::{self, Spot};
+use super::{Seeded, Sensor};
+
+/// An organ of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct OrganRef {
+    /// Index of the plant in [`Scene::plants`].
+    pub plant: u32,
+    /// Index of the organ in the plant.
+    pub organ: u32,
+}
+
+/// A picture with its truth; all rasters have one size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// What the camera recorded.
+    pub rgb: Rgb,
+    /// Metres along the camera's axis, of plants, ground, wall and pots; 0 for the sky.
+    pub depth: Depth,
+    /// [`demeter_frame::Semantic`] as u8.
+    pub semantic: GrayImage,
+    /// Organ instances, 0 for background.
+    pub instances: Instances,
+    /// The organ of each instance id; id 1 is entry 0.
+    pub organs: Vec<OrganRef>,
+}
+
+/// What one ray saw.
+#[derive(Clone, Copy, Default)]
+struct Sample {
+    light: Vec3,
+    depth: f32,
+    instance: u16,
+}
+
+/// Takes a picture; `rng` drives the sensor's noise alone.
+#[must_use]
+pub fn render(scene: &Scene, camera: &Pinhole, sensor: &Sensor, rng: &mut Seeded) -> View {
+    let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
+    let side = sensor.samples.clamp(1, 4);
+    let fine = Pinhole { intrinsics: camera.intrinsics.resized(width * side, height * side), ..*camera };
+    let samples = look(scene, &fine);
+    let mut view = View {
+        rgb: Rgb::default(),
+        depth: Depth::new(width, height),
+        semantic: GrayImage::new(width, height),
+        instances: Instances::new(width, height),
+        organs: scene.looks[1..].iter().map(|l| OrganRef { plant: l.plant, organ: l.organ }).collect(),
+    };
+    let mut light = Vec::with_capacity((width * height) as usize);
+    let mut seen = Vec::with_capacity((side * side) as usize);
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        seen.clear();
+        for k in 0..side * side {
+            let (i, j) = (x * side + k % side, y * side + k / side);
+            seen.push(samples[(j * width * side + i) as usize]);
+        }
+        light.push(seen.iter().map(|s| s.light).sum::<Vec3>() / seen.len() as f32);
+        let winner = majority(&seen);
+        view.depth.put_pixel(x, y, image::Luma([winner.depth]));
+        view.instances.put_pixel(x, y, image::Luma([winner.instance]));
+        // Pots are instance 0, whose look is background.
+        let semantic = scene.looks[usize::from(winner.instance)].semantic as u8;
+        view.semantic.put_pixel(x, y, image::Luma([semantic]));
+    }
+    view.rgb = sensor.expose(&light, width, height, rng);
+    view
+}
+
+/// The sample of the instance that most rays saw; of equals the nearest.
+fn majority(seen: &[Sample]) -> Sample {
+    let votes = |s: &Sample| seen.iter().filter(|o| o.instance == s.instance).count();
+    let rank = |s: &Sample| (votes(s), if s.depth > 0.0 { -s.depth } else { f32::NEG_INFINITY });
+    let better = |a: &Sample, b: &Sample| {
+        let ((av, ad), (bv, bd)) = (rank(a), rank(b));
+        av > bv || (av == bv && ad > bd)
+    };
+    seen.iter().copied().reduce(|a, b| if better(&b, &a) { b } else { a }).unwrap_or_default()
+}
+
+/// One ray a pixel: first which face each sees, then the light of that face alone.
+fn look(scene: &Scene, camera: &Pinhole) -> Vec<Sample> {
+    let Intrinsics { width, height, fx, fy, cx, cy } = camera.intrinsics;
+    let lens = [fx, fy, cx, cy].map(|x| x as f32);
+    let world_from_camera = Mat3::from_quat(camera.world_from_camera.rotation.as_quat());
+    let eye = camera.world_from_camera.translation.as_vec3();
+    let camera_from_world = world_from_camera.transpose();
+    let in_camera: Vec<Vec3> = scene.positions.iter().map(|p| camera_from_world * (*p - eye)).collect();
+    let mut buffer = Buffer::new(width as usize, height as usize, 0.0);
+    for (n, face) in scene.faces.iter().enumerate() {
+        buffer.fill_perspective(face.map(|v| in_camera[v as usize]), lens, n as u32);
+    }
+    let mut samples = Vec::with_capacity(buffer.face.len());
+    for (n, (face, inverse)) in buffer.face.iter().zip(&buffer.key).enumerate() {
+        let at = Vec2::new((n % buffer.width) as f32 + 0.5, (n / buffer.width) as f32 + 0.5);
+        // Its z in the camera is 1, so distances along it are depths.
+        let ray = world_from_camera * Vec3::new((at.x - lens[2]) / lens[0], (at.y - lens[3]) / lens[1], 1.0);
+        // Leaves that hang below the ground are hidden by it.
+        let buried = *face != NONE && shade::ground_distance(scene, eye, ray) * inverse < 1.0;
+        samples.push(if *face == NONE || buried {
+            let seen = shade::background(scene, eye, ray);
+            let depth = if seen.distance.is_finite() { seen.distance } else { 0.0 };
+            Sample { light: seen.colour, depth, instance: 0 }
+        } else {
+            let instance = scene.instances[*face as usize];
+            let spot = spot(scene, *face as usize, eye, ray, 1.0 / inverse);
+            let light = shade::organ(scene, &scene.looks[usize::from(instance)], &spot);
+            Sample { light, depth: 1.0 / inverse, instance }
+        });
+    }
+    samples
+}
+
+/// Position, normal and uv of a face at `depth` along a ray.
+fn spot(scene: &Scene, face: usize, eye: Vec3, ray: Vec3, depth: f32) -> Spot {
+    let position = eye + ray * depth;
+    let corners = scene.faces[face].map(|v| v as usize);
+    let [a, b, c] = corners.map(|v| scene.positions[v]);
+    let (e, f, p) = (b - a, c - a, position - a);
+    let (ee, ef, ff, pe, pf) = (e.dot(e), e.dot(f), f.dot(f), p.dot(e), p.dot(f));
+    let scale = 1.0 / (ee * ff - ef * ef).max(1e-20);
+    let v = ((ff * pe - ef * pf) * scale).clamp(0.0, 1.0);
+    let w = ((ee * pf - ef * pe) * scale).clamp(0.0, 1.0 - v);
+    let weights = [1.0 - v - w, v, w];
+    let normal: Vec3 = (0..3).map(|i| scene.normals[corners[i]] * weights[i]).sum();
+    let uv: Vec2 = (0..3).map(|i| scene.uvs[corners[i]] * weights[i]).sum();
+    Spot { position, normal: normal.normalize_or(Vec3::Z), uv, to_eye: -ray.normalize() }
+}

@@ -1,0 +1,95 @@
+use glam::{Vec2, Vec3};
+
+use super::texture::{fractal, hash, noise, pebble, unit};
+
+/// What ground and walls look like; colours are linear reflectances, lengths metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Surface {
+    /// One colour with a faint large pattern.
+    Plain {
+        /// Its colour.
+        colour: Vec3,
+    },
+    /// Crumbly earth with stones and straw.
+    Soil {
+        /// Its colour.
+        colour: Vec3,
+        /// Share of cells of 4 cm with a stone, 0..=1.
+        stones: f32,
+        /// Share of cells of 7 cm with a straw, 0..=1.
+        straw: f32,
+        /// Share of cells of 9 cm with a speck of green that is no plant, 0..=1.
+        weeds: f32,
+    },
+    /// Things of many colours: what a network must learn to ignore.
+    Clutter {
+        /// Size of the things.
+        size: f32,
+    },
+    /// A light wall with dark and grey uprights at both sides, as in imaging chambers.
+    Chamber {
+        /// Colour of the middle.
+        colour: Vec3,
+        /// Where the uprights begin left and right of the middle.
+        half_width: f32,
+    },
+}
+
+impl Surface {
+    /// The linear colour at `p` metres on the surface.
+    pub(super) fn colour(&self, p: Vec2, seed: u32) -> Vec3 {
+        match *self {
+            Self::Plain { colour } => colour * (0.96 + 0.08 * noise(p * 2.0, seed)),
+            Self::Soil { colour, stones, straw, weeds } => soil(p, colour, [stones, straw, weeds], seed),
+            Self::Clutter { size } => clutter(p / size, seed),
+            Self::Chamber { colour, half_width } => {
+                let beyond = p.x.abs() - half_width;
+                if beyond < 0.0 {
+                    return colour * (0.97 + 0.06 * noise(p * 1.5, seed));
+                }
+                let bar = hash(glam::IVec2::new((beyond / 0.06) as i32, i32::from(p.x < 0.0)), seed);
+                Vec3::splat(0.02 + 0.5 * unit(bar) * unit(bar)) * (0.8 + 0.4 * noise(p * 3.0, seed))
+            }
+        }
+    }
+}
+
+fn soil(p: Vec2, colour: Vec3, [stones, straw, weeds]: [f32; 3], seed: u32) -> Vec3 {
+    let crumbs = fractal(p * 40.0, 3, seed);
+    let patches = noise(p * 3.0, seed ^ 1);
+    let mut c = colour * (0.35 + 1.0 * crumbs + 0.3 * patches);
+    let (inside, h) = pebble(p / 0.04, 1.0, stones, seed ^ 2);
+    if inside > 0.05 {
+        let grey = 0.12 + 0.4 * unit(h.rotate_left(9));
+        c = Vec3::new(1.0, 0.96, 0.9) * grey * (0.55 + 0.6 * inside.min(0.6) + 0.3 * crumbs);
+    }
+    let (inside, h) = pebble(p / 0.07, 9.0, straw, seed ^ 3);
+    if inside > 0.1 {
+        c = Vec3::new(0.42, 0.33, 0.17) * (0.5 + unit(h.rotate_left(7)));
+    }
+    let (inside, h) = pebble(p / 0.09, 2.5, weeds, seed ^ 4);
+    if inside > 0.45 {
+        c = Vec3::new(0.10, 0.2, 0.05) * (0.4 + unit(h.rotate_left(5)));
+    }
+    c
+}
+
+/// Overlapping flat things: the topmost pebble of several layers wins.
+fn clutter(p: Vec2, seed: u32) -> Vec3 {
+    for layer in 0..3u32 {
+        let stretch = 1.0 + 3.0 * unit(hash(glam::IVec2::new(layer as i32, 0), seed));
+        let (inside, h) = pebble(p * (1.0 + 0.7 * layer as f32), stretch, 0.75, seed ^ (layer + 7));
+        if inside > 0.0 {
+            return tint(h) * (0.7 + 0.5 * fractal(p * 6.0, 2, h));
+        }
+    }
+    tint(seed) * (0.7 + 0.6 * fractal(p, 3, seed))
+}
+
+/// A random linear colour, greys and browns more often than bright ones.
+fn tint(h: u32) -> Vec3 {
+    let part = |k: u32| unit(hash(glam::IVec2::new(h as i32, k as i32), 77));
+    let grey = 0.02 + 0.8 * part(0) * part(0);
+    let colour = Vec3::new(part(1), part(2), part(3)) * 0.8;
+    Vec3::splat(grey).lerp(colour, part(4) * part(4))
+}
