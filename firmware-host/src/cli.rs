@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::doctor;
+use crate::commands::{doctor, synth};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -25,12 +25,15 @@ struct Cli {
 enum Command {
     /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
     Doctor(doctor::Args),
+    /// Make synthetic plants, sessions, clouds and training pictures, with their truth.
+    Synth(synth::Args),
 }
 
 impl Command {
     fn run(&self, output: &Output) -> Result<Exit, CommandError> {
         match self {
             Self::Doctor(args) => doctor::run(args, output),
+            Self::Synth(args) => synth::run(args, output),
         }
     }
 }

@@ -1,3 +1,4 @@
 //! One file a command: its arguments and what it does with them.
 
 pub mod doctor;
+pub mod synth;

@@ -31,7 +31,14 @@ pub fn labelled_cloud(
     let label_of: Vec<i32> = plant
         .organs
         .iter()
-        .map(|organ| if organ.kind() == OrganKind::Leaf { blades += 1; blades } else { 0 })
+        .map(|organ| {
+            if organ.kind() == OrganKind::Leaf {
+                blades += 1;
+                blades
+            } else {
+                0
+            }
+        })
         .collect();
     let mut total = 0.0;
     let reach: Vec<f64> = (0..mesh.faces.len())

@@ -21,7 +21,7 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
     let stalk = sprout.stem(None, lean, height, radius, gamma);
 
     // The longest blade stands at two thirds of the height (Kiesselbach); 30 cm on a seedling, near 1 m later.
-    let longest = (0.30 + 0.55 * age.powf(0.8)) * (0.15 * normal(rng)).exp();
+    let longest = (0.30 + 0.60 * age.powf(0.8)) * (0.15 * normal(rng)).exp();
     let plane = rng.random_range(0.0..2.0 * PI);
     let drift = 0.05 * normal(rng);
     let width = (0.85 + 0.15 * normal(rng)).max(0.5);
@@ -32,13 +32,13 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
         let d = (0.08 + 0.90 * up.powf(0.9) + 0.012 * normal(rng)).clamp(0.03, 1.0);
         // Distichous: each leaf opposite the last (Kiesselbach), with a scatter of 10 degrees and a slow drift (guess).
         let azimuth = plane + PI * (i % 2) as f64 + drift * i as f64 + 0.17 * normal(rng);
-        let profile = 0.45 + 0.55 * (1.0 - ((up - 0.62) / 0.62).powi(2)).max(0.0);
+        let profile = 0.6 + 0.4 * (1.0 - ((up - 0.6) / 0.6).powi(2)).max(0.0);
         let length = longest * profile * (0.08 * normal(rng)).exp();
         // Leaf angles from the stalk: 15 degrees in the whorl to 50 below (guess within the published 10 to 60).
         let tilt = (0.85 - 0.6 * up + 0.08 * lax + 0.1 * normal(rng)).clamp(0.08, 1.3);
         let mut gamma = coefficients(rng, species.leaf.deform.rank(), 0.8);
         // Long unfolded blades arch over by a right angle or more, the whorl's stand; γ_0 is the total turn.
-        gamma[0] = (2.0 - 1.7 * up + 0.4 * lax + 0.4 * gamma[0]).clamp(-0.4, 3.0);
+        gamma[0] = (2.5 - 2.0 * up + 0.5 * lax + 0.5 * gamma[0]).clamp(-0.3, 3.0);
         let blade = Blade {
             beta: coefficients(rng, species.leaf.shape.rank(), 0.8),
             gamma,

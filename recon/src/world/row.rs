@@ -70,6 +70,8 @@ pub fn row(
 pub struct Lab {
     /// The wall behind it.
     pub wall: Surface,
+    /// Height of the floor, metres; far below the pot it is never seen.
+    pub floor: f64,
     /// The pot.
     pub pot: Pot,
     /// The light.
@@ -82,7 +84,7 @@ pub struct Lab {
 /// [`WorldError`] when the plant is none.
 pub fn lab(species: &Species, plant: Plant, lab: &Lab, seed: u64) -> Result<Scene, WorldError> {
     let setting = Setting {
-        ground: Ground { z: -lab.pot.height - 0.3, surface: Surface::Plain { colour: Vec3::splat(0.35) } },
+        ground: Ground { z: lab.floor, surface: Surface::Plain { colour: Vec3::splat(0.35) } },
         backdrop: Backdrop::Wall { distance: 1.5, surface: lab.wall },
         pot: Some(lab.pot),
         light: lab.light,

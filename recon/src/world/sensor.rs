@@ -69,7 +69,7 @@ fn srgb(x: f32) -> u8 {
 
 /// A separable Gaussian of at most 9 taps.
 fn blur(light: &mut [Vec3], width: usize, sigma: f32) {
-    if !(sigma > 0.05) || width == 0 {
+    if sigma.is_nan() || sigma <= 0.05 || width == 0 {
         return;
     }
     let reach = ((2.5 * sigma).ceil() as usize).min(4);

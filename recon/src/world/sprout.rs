@@ -5,8 +5,8 @@ use glam::{DMat3, DQuat, DVec3};
 use rand::Rng;
 
 use super::Seeded;
-use crate::model::leaf::Blade;
 use crate::model::kinematics::attachment;
+use crate::model::leaf::Blade;
 use crate::model::stem::StemCurve;
 use crate::model::{Form, Joint, Organ, Plant, Species};
 

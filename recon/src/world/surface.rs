@@ -58,7 +58,9 @@ fn soil(p: Vec2, colour: Vec3, [stones, straw, weeds]: [f32; 3], seed: u32) -> V
     let crumbs = fractal(p * 40.0, 3, seed);
     let patches = noise(p * 3.0, seed ^ 1);
     let mut c = colour * (0.35 + 1.0 * crumbs + 0.3 * patches);
-    let (inside, h) = pebble(p / 0.04, 1.0, stones, seed ^ 2);
+    // Warping makes stones and leaves of round pebbles.
+    let warp = |by: f32, s: u32| Vec2::new(noise(p * 55.0, seed ^ s), noise(p * 55.0, seed ^ s ^ 64)) * by;
+    let (inside, h) = pebble((p + warp(0.03, 11)) / 0.04, 1.0, stones, seed ^ 2);
     if inside > 0.05 {
         let grey = 0.12 + 0.4 * unit(h.rotate_left(9));
         c = Vec3::new(1.0, 0.96, 0.9) * grey * (0.55 + 0.6 * inside.min(0.6) + 0.3 * crumbs);
@@ -67,7 +69,7 @@ fn soil(p: Vec2, colour: Vec3, [stones, straw, weeds]: [f32; 3], seed: u32) -> V
     if inside > 0.1 {
         c = Vec3::new(0.42, 0.33, 0.17) * (0.5 + unit(h.rotate_left(7)));
     }
-    let (inside, h) = pebble(p / 0.09, 2.5, weeds, seed ^ 4);
+    let (inside, h) = pebble((p + warp(0.04, 13)) / 0.09, 2.5, weeds, seed ^ 4);
     if inside > 0.45 {
         c = Vec3::new(0.10, 0.2, 0.05) * (0.4 + unit(h.rotate_left(5)));
     }
@@ -76,6 +78,7 @@ fn soil(p: Vec2, colour: Vec3, [stones, straw, weeds]: [f32; 3], seed: u32) -> V
 
 /// Overlapping flat things: the topmost pebble of several layers wins.
 fn clutter(p: Vec2, seed: u32) -> Vec3 {
+    let p = p + Vec2::new(noise(p * 2.5, seed ^ 21), noise(p * 2.5, seed ^ 22)) * 0.45;
     for layer in 0..3u32 {
         let stretch = 1.0 + 3.0 * unit(hash(glam::IVec2::new(layer as i32, 0), seed));
         let (inside, h) = pebble(p * (1.0 + 0.7 * layer as f32), stretch, 0.75, seed ^ (layer + 7));

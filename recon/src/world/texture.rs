@@ -4,7 +4,8 @@ use glam::{IVec2, Vec2};
 
 /// A well-mixed hash of a lattice point (the finaliser of MurmurHash3).
 pub(super) fn hash(at: IVec2, seed: u32) -> u32 {
-    let mut h = seed ^ (at.x as u32).wrapping_mul(0x9E37_79B1) ^ (at.y as u32).wrapping_mul(0x85EB_CA77).rotate_left(13);
+    let mut h =
+        seed ^ (at.x as u32).wrapping_mul(0x9E37_79B1) ^ (at.y as u32).wrapping_mul(0x85EB_CA77).rotate_left(13);
     h = (h ^ (h >> 16)).wrapping_mul(0x85EB_CA6B);
     h = (h ^ (h >> 13)).wrapping_mul(0xC2B2_AE35);
     h ^ (h >> 16)

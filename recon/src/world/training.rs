@@ -47,7 +47,7 @@ fn aim(scene: &Scene, from: DVec3, fill: f64, size: u32, rng: &mut Seeded) -> Pi
     let extent = |axis: DVec3| (axis.abs() * half).element_sum();
     let (across, up, deep) = (extent(look * DVec3::X), extent(look * DVec3::Y), extent(look * DVec3::Z));
     let reach = across.max(up) / fill;
-    let distance = reach * intrinsics.fx / (0.5 * f64::from(size)) + deep.min(reach);
+    let distance = reach * intrinsics.fx / (0.5 * f64::from(size)) + 0.5 * deep.min(reach);
     let jitter = DVec3::new(rng.random_range(-0.15..0.15), rng.random_range(-0.15..0.15), 0.0) * reach;
     let target = (low + high).as_dvec3() * 0.5 + look * jitter;
     let mut eye = target + from.normalize() * distance;
@@ -73,16 +73,18 @@ fn potted(species: &Species, size: u32, rng: &mut Seeded) -> Result<(Scene, Pinh
         height: radius * rng.random_range(1.2..2.2),
         colour: Vec3::splat(rng.random_range(0.02f32..0.9)),
     };
+    // Crops of imaging chambers show no floor.
+    let floor = if rng.random_bool(0.75) { -4.0 } else { -pot.height - rng.random_range(0.0..0.4) };
     let lamp = rng.random_range(0.0f32..0.9);
     let light = Light {
         to_sun: direction(rng.random_range(0.0..TAU), rng.random_range(0.2..1.4)),
         sun: Vec3::new(1.0, 0.97, 0.9) * lamp,
         ambient: Vec3::splat(rng.random_range(0.12..0.7)),
     };
-    let scene = lab(species, plant, &Lab { wall, pot, light }, rng.random())?;
+    let scene = lab(species, plant, &Lab { wall, floor, pot, light }, rng.random())?;
     let azimuth = -0.5 * PI + rng.random_range(-0.1..0.1);
     let from = direction(azimuth, rng.random_range(-0.05..0.25)).as_dvec3();
-    let fill = if rng.random_bool(0.25) { rng.random_range(0.9..1.8) } else { rng.random_range(0.55..1.0) };
+    let fill = if rng.random_bool(0.3) { rng.random_range(1.2..2.4) } else { rng.random_range(0.85..1.2) };
     let camera = aim(&scene, from, fill, size, rng);
     Ok((scene, camera, exposure))
 }
@@ -126,7 +128,7 @@ fn outdoors(species: &Species, size: u32, rng: &mut Seeded) -> Result<(Scene, Pi
         _ => rng.random_range(0.8..1.3),
     };
     let from = direction(-0.5 * PI + rng.random_range(-0.6..0.6), above).as_dvec3();
-    let fill = if in_row { rng.random_range(0.8..2.5) } else { rng.random_range(0.5..1.6) };
+    let fill = if in_row { rng.random_range(1.2..4.0) } else { rng.random_range(0.9..2.6) };
     let camera = aim(&scene, from, fill, size, rng);
     Ok((scene, camera, 0.22))
 }

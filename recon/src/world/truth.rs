@@ -56,10 +56,7 @@ pub struct OrganTruth {
 ///
 /// # Errors
 /// [`PlantError`] when a plant is none, which [`Scene::new`] rules out.
-pub fn truth<'a>(
-    scene: &Scene,
-    species: impl Fn(&str) -> Option<&'a Species>,
-) -> Result<Vec<PlantTruth>, PlantError> {
+pub fn truth<'a>(scene: &Scene, species: impl Fn(&str) -> Option<&'a Species>) -> Result<Vec<PlantTruth>, PlantError> {
     scene.plants.iter().filter_map(|plant| species(&plant.species).map(|species| of(plant, species))).collect()
 }
 
