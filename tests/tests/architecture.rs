@@ -23,7 +23,8 @@ const IMPURE: &str = "fs:: net:: env:: process:: thread:: time:: Instant SystemT
 const IMPURE_CRATES: [&str; 8] = ["jiff", "log", "metrics", "ort", "rayon", "rusqlite", "tokio", "tracing"];
 
 /// Source files longer than [`LINES`], each with the reason why it stays in one piece.
-const LONG: [(&str, &str); 0] = [];
+const LONG: [(&str, &str); 1] =
+    [("recon/src/record/compact.rs", "writing and reading are one walk over the plant: apart, they could disagree")];
 const LINES: usize = 400;
 
 /// Package registries and their mirrors, halved so that this list does not find itself.
