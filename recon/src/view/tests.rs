@@ -276,7 +276,7 @@ proptest! {
                 if reverse {
                     seen.reverse();
                 }
-                let (now, lost) = tracker.frame(f as u64, DVec2::new(0.2 * f as f64, 0.0), seen);
+                let (now, lost) = tracker.frame(&f, 0.2 * f as f64, seen);
                 assert!(lost.is_empty());
                 closed.extend(now);
             }
@@ -308,7 +308,7 @@ fn a_plant_seen_in_every_frame_is_one_and_closes_when_passed() {
             quality: Quality { whole: true, pixels: 100, off_centre: (x - camera).abs() },
             view: (x, f),
         });
-        closed.extend(tracker.frame(f, DVec2::new(camera, 0.0), seen.collect()).0);
+        closed.extend(tracker.frame(&f, camera, seen.collect()).0);
     }
     assert!(!closed.is_empty(), "the first plants are passed before the end");
     closed.extend(tracker.finish());
@@ -324,6 +324,6 @@ fn an_observation_without_a_place_is_given_back() {
     let mut tracker = Tracker::new(Gate(0.1));
     let quality = Quality { whole: true, pixels: 1, off_centre: 0.0 };
     let nowhere = Observation { position: DVec2::NAN, quality, view: () };
-    assert_eq!(tracker.frame(0, DVec2::ZERO, vec![nowhere]).1.len(), 1);
+    assert_eq!(tracker.frame(&0, 0.0, vec![nowhere]).1.len(), 1);
     assert!(tracker.finish().is_empty());
 }

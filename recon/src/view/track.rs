@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-/// A track ends when the camera has moved this far since it was last seen, metres: a plant that is hidden or missed for
-/// that long has left the picture (a guess for cameras that see 1 m of row).
+/// A track ends when the rig has gone this far since it was last seen, metres: a plant that is hidden or missed for that
+/// long has left the picture (a guess for cameras that see 1 m of row).
 const PASSED_M: f64 = 0.5;
 /// Most tracks open at once; the one unseen for longest is closed for a new one. A picture holds far fewer plants.
 const MAX_OPEN: usize = 256;
@@ -54,61 +54,61 @@ pub struct Observation<T> {
     pub view: T,
 }
 
-/// A plant that the camera has passed.
+/// A plant that the rig has passed; `F` names a frame, `T` is what is kept of a view.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Closed<T> {
+pub struct Closed<F, T> {
     /// Its number in the session, 1 and up: in the order of closing, and of opening where several close at once.
     pub number: u64,
     /// Mean of the observed positions, metres.
     pub position: DVec2,
     /// The frames it was seen in, in order.
-    pub frames: Vec<u64>,
+    pub frames: Vec<F>,
     /// The frame of the best view.
-    pub best_frame: u64,
+    pub best_frame: F,
     /// The best view.
     pub best: T,
 }
 
 #[derive(Clone, Debug)]
-struct Track<T> {
+struct Track<F, T> {
     sum: DVec2,
-    frames: Vec<u64>,
-    last_camera: DVec2,
-    best: (Quality, u64, T),
+    frames: Vec<F>,
+    last_seen: f64,
+    best: (Quality, F, T),
 }
 
-impl<T> Track<T> {
+impl<F, T> Track<F, T> {
     fn position(&self) -> DVec2 {
         self.sum / self.frames.len() as f64
     }
 }
 
-/// Collects observations into plants while a camera drives along.
+/// Collects observations into plants while a rig drives along.
 ///
 /// Every observation belongs to exactly one track; the order in which one frame's observations are given does not
 /// matter.
 #[derive(Clone, Debug)]
-pub struct Tracker<T> {
+pub struct Tracker<F, T> {
     gate: Gate,
-    open: Vec<Track<T>>,
+    open: Vec<Track<F, T>>,
     closed: u64,
 }
 
-impl<T> Tracker<T> {
+impl<F: Clone, T> Tracker<F, T> {
     /// A tracker that has seen nothing.
     #[must_use]
     pub fn new(gate: Gate) -> Self {
         Self { gate, open: Vec::new(), closed: 0 }
     }
 
-    /// Takes the plants of one frame, seen from `camera` (on the ground plane, metres), and gives those the camera has
+    /// Takes the plants of one frame, seen when the rig had gone `travelled` metres in all, and gives those the rig has
     /// passed. Observations whose position is not finite cannot be placed and are given back.
     pub fn frame(
         &mut self,
-        frame: u64,
-        camera: DVec2,
+        frame: &F,
+        travelled: f64,
         observations: Vec<Observation<T>>,
-    ) -> (Vec<Closed<T>>, Vec<Observation<T>>) {
+    ) -> (Vec<Closed<F, T>>, Vec<Observation<T>>) {
         let (mut seen, lost): (Vec<_>, Vec<_>) = observations.into_iter().partition(|o| o.position.is_finite());
         seen.sort_by(|a, b| a.position.x.total_cmp(&b.position.x).then(a.position.y.total_cmp(&b.position.y)));
         let matches = self.matches(&seen);
@@ -118,35 +118,36 @@ impl<T> Tracker<T> {
                 Some(track) => {
                     let track = &mut self.open[track];
                     track.sum += position;
-                    track.frames.push(frame);
-                    track.last_camera = camera;
+                    track.frames.push(frame.clone());
+                    track.last_seen = travelled;
                     if quality.beats(&track.best.0) {
-                        track.best = (quality, frame, view);
+                        track.best = (quality, frame.clone(), view);
                     }
                 }
                 None => self.open.push(Track {
                     sum: position,
-                    frames: vec![frame],
-                    last_camera: camera,
-                    best: (quality, frame, view),
+                    frames: vec![frame.clone()],
+                    last_seen: travelled,
+                    best: (quality, frame.clone(), view),
                 }),
             }
         }
+        // The tracks unseen for longest make room, and those that were passed go in any case.
         let over = self.open.len().saturating_sub(MAX_OPEN);
         let mut by_age: Vec<usize> = (0..self.open.len()).collect();
-        by_age.sort_by_key(|&i| (self.open[i].frames.last().copied(), i));
+        by_age.sort_by(|&a, &b| self.open[a].last_seen.total_cmp(&self.open[b].last_seen).then(a.cmp(&b)));
         let crowded_out = by_age[..over].to_vec();
         let mut index = 0;
         let passed = self.open.extract_if(.., |track| {
             index += 1;
-            crowded_out.contains(&(index - 1)) || track.last_camera.distance(camera) > PASSED_M
+            crowded_out.contains(&(index - 1)) || travelled - track.last_seen > PASSED_M
         });
         let passed: Vec<_> = passed.collect();
         (self.close(passed), lost)
     }
 
     /// Closes what is still open.
-    pub fn finish(mut self) -> Vec<Closed<T>> {
+    pub fn finish(mut self) -> Vec<Closed<F, T>> {
         let rest = std::mem::take(&mut self.open);
         self.close(rest)
     }
@@ -174,7 +175,7 @@ impl<T> Tracker<T> {
         matched
     }
 
-    fn close(&mut self, tracks: Vec<Track<T>>) -> Vec<Closed<T>> {
+    fn close(&mut self, tracks: Vec<Track<F, T>>) -> Vec<Closed<F, T>> {
         let first = self.closed;
         self.closed += tracks.len() as u64;
         let number = first + 1..;
