@@ -21,8 +21,11 @@ const LOOSE: f64 = 0.5;
 const STAND_IN_POINTS: usize = 48;
 /// And is at least this long, in sizes of its plant.
 const STAND_IN_LENGTH: f64 = 0.1;
-/// Farthest that the ray to a base may move it along the ground, metres (a guess: monocular depth is about 10 % off).
-const MAX_SHIFT: f64 = 0.3;
+/// A base is taken to be on the ground when it is seen no higher than this share of its distance: depth is about that
+/// uncertain (a guess).
+const NEAR_GROUND: f64 = 0.06;
+/// A stem stands upright when the vertical component of its axis is over this (45 degrees); only such a one is drawn on.
+const UPRIGHT: f64 = 0.7;
 /// Share of points at either end of an organ that make its end.
 const END: f64 = 0.03;
 
@@ -248,19 +251,23 @@ fn nearer_end(points: &[DVec3], target: DVec3) -> DVec3 {
 }
 
 impl PlantView {
-    /// Where it stands on the ground z = 0: under the ray to its base when that was seen, which a wrong depth cannot
-    /// move; else under the base itself. Metres, in a view with a pose.
+    /// Where it stands on the ground z = 0, metres, in a view with a pose: under the ray to its base when that was seen
+    /// near the ground, which a wrong depth cannot move; else where its stem, drawn on downwards, would end.
     #[must_use]
     pub fn ground_position(&self, view: &View<'_>) -> DVec2 {
         let hit = self.base_pixel.zip(view.world_from_camera).and_then(|(p, pose)| {
-            let at = DVec2::new(f64::from(p % view.intrinsics.width) + 0.5, f64::from(p / view.intrinsics.width) + 0.5);
+            let (x, y) = (p % view.intrinsics.width, p / view.intrinsics.width);
+            let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
             let ray = pose.rotation * view.intrinsics.unproject(at, 1.0);
             let depth = -pose.translation.z / ray.z;
-            let hit = (pose.translation + ray * depth).truncate();
-            // A base that was hidden is seen too high and meets the ground far behind the plant.
-            (depth > 0.0 && hit.distance(self.base.truncate()) <= MAX_SHIFT).then_some(hit)
+            let near_ground = self.base.z <= NEAR_GROUND * self.base.distance(pose.translation);
+            (depth > 0.0 && near_ground).then(|| (pose.translation + ray * depth).truncate())
         });
-        hit.unwrap_or(self.base.truncate())
+        hit.unwrap_or_else(|| {
+            let axis = principal_axes(&self.organs[0].points).1.x_axis;
+            let upright = axis.z.abs() > UPRIGHT;
+            (self.base - if upright { axis * (self.base.z / axis.z) } else { DVec3::ZERO }).truncate()
+        })
     }
 
     /// How far its middle is from the picture's, 0 at the middle to 1 at a corner.

@@ -6,11 +6,13 @@ use demeter_frame::{Instances, Semantic};
 use image::ImageBuffer;
 
 use super::View;
+use super::lift::MAX_SLOPE;
 use crate::model::OrganKind;
 
-/// Pixels at or over this truncated inverse distance lie at the border of two organs and found no instance. With
-/// t = δ / max(d, δ) it is a distance of 2 δ (ours to tune, reconstruction.md "Points to organs").
-const BOUNDARY: f32 = 0.5;
+/// Pixels at or over this truncated inverse distance lie at the border of two organs and found no instance. It
+/// saturates at 1 within δ = 1 % of the diagonal, and organs are seldom wider than a few δ: the threshold is near 1
+/// (ours to tune, reconstruction.md "Points to organs").
+const BOUNDARY: f32 = 0.9;
 /// The smallest seed at 640 x 480, pixels: smaller ones are specks (a guess).
 const MIN_SEED: f64 = 10.0;
 /// Most instances in one picture; the smallest go first. A bound for later stages, far above any plant row in view.
@@ -37,7 +39,12 @@ pub struct Region {
 /// nearest inside the class. Patches that no seed reaches (thin organs, boundary all over) are instances of their own.
 #[must_use]
 pub fn instances(view: &View<'_>) -> (Instances, Vec<Region>) {
-    let grid = Grid { width: view.intrinsics.width as usize, height: view.intrinsics.height as usize };
+    let grid = Grid {
+        width: view.intrinsics.width as usize,
+        height: view.intrinsics.height as usize,
+        log_depth: view.log_depth.as_raw(),
+        jump: (MAX_SLOPE / view.intrinsics.fx.min(view.intrinsics.fy)) as f32,
+    };
     let class: Vec<u8> = view.semantic.as_raw().iter().map(|&c| if kind(c).is_some() { c } else { 0 }).collect();
     let dist = view.dist.as_raw();
     // Main stems do not cross, but leaves all along would cut them: they need no boundary.
@@ -67,18 +74,23 @@ fn kind(class: u8) -> Option<OrganKind> {
     }
 }
 
-struct Grid {
+struct Grid<'a> {
     width: usize,
     height: usize,
+    log_depth: &'a [f32],
+    /// Largest change of log depth from one pixel to the next on one organ.
+    jump: f32,
 }
 
-impl Grid {
-    /// The up to eight neighbours of pixel `p`: stems one pixel wide run diagonally.
+impl Grid<'_> {
+    /// The up to eight neighbours of pixel `p` that are not before or behind it: stems one pixel wide run diagonally.
     fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> {
         let (x, y, width, height) = (p % self.width, p / self.width, self.width, self.height);
+        let (log_depth, jump) = (self.log_depth, self.jump);
+        let apart = move |q: usize| (log_depth[q] - log_depth[p]).abs() > jump;
         let rows = y.saturating_sub(1)..(y + 2).min(height);
         rows.flat_map(move |j| (x.saturating_sub(1)..(x + 2).min(width)).map(move |i| j * width + i))
-            .filter(move |&q| q != p)
+            .filter(move |&q| q != p && !apart(q))
     }
 
     /// Connected pixels of equal, non-zero `key`, at least `min` of them: labels from `first` + 1 on, and the last.

@@ -10,7 +10,7 @@ use crate::organs::OrganCloud;
 
 /// A surface seen steeper than this (tangent of the angle between its normal and the ray) is taken for a depth edge:
 /// 84 degrees, where a pixel's depth says little. Ours; the paper only says "gradient".
-const MAX_SLOPE: f64 = 10.0;
+pub(super) const MAX_SLOPE: f64 = 10.0;
 /// Fewest points of a stem and of a leaf at 640 x 480 (paper supp. "2D Reconstruction").
 const MIN_STEM: f64 = 30.0;
 const MIN_LEAF: f64 = 100.0;

@@ -13,6 +13,7 @@ mod gap;
 mod group;
 mod instances2d;
 mod lift;
+mod overlay;
 mod scale;
 mod track;
 
@@ -22,6 +23,7 @@ use image::GrayImage;
 pub use group::{GroupError, PlantView, Refused, group};
 pub use instances2d::{Region, instances};
 pub use lift::{DropReason, Dropped, Lifted, LiftedOrgan, lift};
+pub use overlay::overlay;
 pub use scale::{DepthScale, ScaleError, ground_plane, nominal};
 pub use track::{Closed, Gate, Observation, Quality, Tracker};
 
