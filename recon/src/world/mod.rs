@@ -8,7 +8,7 @@ mod boundary;
 mod grow;
 mod labelled;
 mod maize;
-mod raster;
+pub(crate) mod raster;
 mod render;
 mod row;
 mod scene;

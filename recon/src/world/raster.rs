@@ -3,13 +3,13 @@
 use glam::Vec3;
 
 /// No face.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Nearer than this nothing is drawn, metres.
 const NEAR: f32 = 0.02;
 
 /// The face that wins each pixel, and its key (inverse depth, or height towards the light).
-pub(super) struct Buffer {
+pub(crate) struct Buffer {
     pub width: usize,
     pub height: usize,
     pub face: Vec<u32>,
@@ -17,12 +17,12 @@ pub(super) struct Buffer {
 }
 
 impl Buffer {
-    pub(super) fn new(width: usize, height: usize, empty: f32) -> Self {
+    pub(crate) fn new(width: usize, height: usize, empty: f32) -> Self {
         Self { width, height, face: vec![NONE; width * height], key: vec![empty; width * height] }
     }
 
     /// Draws a triangle of (x, y in pixels, key); where it covers a pixel's centre the larger key wins.
-    pub(super) fn fill(&mut self, [a, b, c]: [Vec3; 3], face: u32) {
+    pub(crate) fn fill(&mut self, [a, b, c]: [Vec3; 3], face: u32) {
         let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
         if !(area.abs() > 1e-12 && area.is_finite()) {
             return;
@@ -66,7 +66,7 @@ impl Buffer {
 
     /// Draws a triangle of the camera frame in perspective with focal lengths and centre in pixels; the key is 1/z.
     /// What lies nearer than [`NEAR`] is cut off.
-    pub(super) fn fill_perspective(&mut self, corners: [Vec3; 3], [fx, fy, cx, cy]: [f32; 4], face: u32) {
+    pub(crate) fn fill_perspective(&mut self, corners: [Vec3; 3], [fx, fy, cx, cy]: [f32; 4], face: u32) {
         let project = |p: Vec3| Vec3::new(fx * p.x / p.z + cx, fy * p.y / p.z + cy, 1.0 / p.z);
         let behind = corners.iter().filter(|p| p.z < NEAR).count();
         if behind == 0 {
