@@ -103,7 +103,6 @@ fn instances_of_true_maps_match_the_true_organs() {
             (truth, found, matched) = (truth + t, found + f, matched + m);
         }
         let (recall, precision) = (matched as f64 / truth as f64, matched as f64 / found as f64);
-        println!("{species}: recall {recall:.3} of {truth}, precision {precision:.3} of {found}");
         // Blades that cross a stem or fold over are found in parts.
         assert!(recall > 0.8 && precision > 0.75, "{species}: recall {recall:.3}, precision {precision:.3}");
     }
@@ -146,7 +145,6 @@ fn lifted_points_lie_on_the_true_plants_and_plants_stand_where_they_stand() {
             }
         }
         offs.sort_by(f64::total_cmp);
-        println!("{species_name}: bases off by {offs:.3?} m");
         assert!(offs[offs.len() / 2] < 0.03 && offs[offs.len() * 8 / 10] < 0.1, "{species_name}: {offs:?}");
     }
 }
