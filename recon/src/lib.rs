@@ -17,6 +17,7 @@ pub mod organs;
 pub mod record;
 pub mod segment;
 pub mod species;
+pub mod traits;
 pub mod tree;
 pub mod view;
 pub mod world;

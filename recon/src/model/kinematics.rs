@@ -44,6 +44,9 @@ pub struct PosedPlant {
     pub control: Vec<Vec<DVec3>>,
     /// Stem radius in metres, 0 for blades.
     pub radius: Vec<f64>,
+    /// Unit direction across the base of each organ from which a stem's tube begins its rings: +x of the unbent
+    /// stem, before the gauge, which turns at the slightest change of a nearly straight stem.
+    pub side: Vec<DVec3>,
 }
 
 /// Poses a plant.
@@ -58,6 +61,7 @@ pub fn forward(plant: &Plant, species: &Species) -> Result<PosedPlant, PlantErro
         world_from_organ: Vec::with_capacity(count),
         control: Vec::with_capacity(count),
         radius: Vec::with_capacity(count),
+        side: Vec::with_capacity(count),
     };
     for organ in &plant.organs {
         let base = match organ.parent {
@@ -93,6 +97,8 @@ pub fn forward(plant: &Plant, species: &Species) -> Result<PosedPlant, PlantErro
         };
         posed.control.push(points.into_iter().map(|p| world_from_organ.point(p)).collect());
         posed.radius.push(radius);
+        let unbent = curve.as_ref().map_or(DQuat::IDENTITY, |curve| curve.frames[0]);
+        posed.side.push(world_from_organ.rotation * (unbent * DVec3::X));
         posed.world_from_organ.push(world_from_organ);
         curves.push(curve);
     }

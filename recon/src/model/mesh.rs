@@ -37,11 +37,11 @@ impl PlantMesh {
     #[must_use]
     pub fn of(posed: &PosedPlant, detail: Detail, knots: Knots) -> Self {
         let mut mesh = Self::default();
-        for (organ, (control, radius)) in posed.control.iter().zip(&posed.radius).enumerate() {
+        for (organ, control) in posed.control.iter().enumerate() {
             if control.len() == ROWS * COLUMNS {
                 mesh.add_blade(control, detail, knots);
             } else {
-                mesh.add_stem(control, *radius, detail, knots);
+                mesh.add_stem(control, posed.radius[organ], posed.side[organ], detail, knots);
             }
             mesh.organ_of_face.resize(mesh.faces.len(), organ as u32);
         }
@@ -95,7 +95,7 @@ impl PlantMesh {
         self.smooth_normals(first as usize, start);
     }
 
-    fn add_stem(&mut self, control: &[DVec3], radius: f64, detail: Detail, knots: Knots) {
+    fn add_stem(&mut self, control: &[DVec3], radius: f64, side: DVec3, detail: Detail, knots: Knots) {
         let (sides, steps) = match detail {
             Detail::Coarse => (6, 1),
             Detail::Control => (8, 1),
@@ -109,7 +109,7 @@ impl PlantMesh {
         }
         let first = self.positions.len() as u32;
         let rings = curve.len();
-        let mut normal = DVec3::ZERO;
+        let mut normal = side;
         for i in 0..rings {
             let along = (curve[(i + 1).min(rings - 1)] - curve[i.saturating_sub(1)]).normalize_or(DVec3::Z);
             // Transporting the last ring's direction keeps the tube from twisting.
