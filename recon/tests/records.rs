@@ -9,6 +9,7 @@ use demeter_recon::model::{Detail, Form, Knots, Organ, Plant, PlantMesh, Species
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::record::{RecordError, SpeciesRef, decode, encode_compact, encode_exact, peek};
 use demeter_recon::species::NAMES;
+use demeter_recon::world::{grow, seeded};
 use proptest::prelude::*;
 
 /// spec/demeter-model.md "A plant's record".
@@ -147,6 +148,21 @@ fn nearly_straight_stems_do_not_swing_what_they_carry() {
         let record = decode(&bytes, |_| Some(&species)).unwrap();
         let error = vertex_error(&plant, &record.plant, &species, Detail::Control);
         assert!(error <= VERTEX_ERROR && bytes.len() <= 12 * BYTES_PER_ORGAN, "{seed}: {error} {}", bytes.len());
+    }
+}
+
+/// Plants as they grow, not as chance makes them: small from the first leaves on, everything included.
+#[test]
+fn grown_plants_fit_their_bytes() {
+    for (name, seed) in NAMES.into_iter().flat_map(|name| (0..6).map(move |seed| (name, seed))) {
+        let species = species(name);
+        let plant = grow(&species, 0.2 * seed as f64, &mut seeded(seed));
+        let bytes = encode_compact(&plant, &species, ScaleSource::Stereo).unwrap();
+        let error =
+            vertex_error(&plant, &decode(&bytes, |_| Some(&species)).unwrap().plant, &species, Detail::Refined(2));
+        let organs = plant.organs.len();
+        assert!(bytes.len() <= BYTES_PER_ORGAN * organs, "{name} {seed}: {} bytes, {organs} organs", bytes.len());
+        assert!(error <= VERTEX_ERROR, "{name} {seed}: {error}");
     }
 }
 

@@ -67,7 +67,7 @@ pub fn encode_compact(plant: &Plant, species: &Species, scale_source: ScaleSourc
     let source = Source { plant, posed };
     let effects = Effects::of(species);
     // Begins coarse, where quanta are as large as the error that is allowed, and refines until the goal is kept.
-    let mut precision = octave_quarters(VERTEX_ERROR * unit) + 4;
+    let mut precision = octave_quarters(VERTEX_ERROR * unit);
     let mut found = f64::INFINITY;
     while let Ok(byte) = i8::try_from(precision) {
         let mut writer = Writer::new();
