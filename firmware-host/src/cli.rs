@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::{doctor, synth};
+use crate::commands::{doctor, plants, run, synth};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -27,6 +27,10 @@ enum Command {
     Doctor(doctor::Args),
     /// Make synthetic plants, sessions, clouds and training pictures, with their truth.
     Synth(synth::Args),
+    /// List, show and export the plants of a store.
+    Plants(plants::Args),
+    /// Run the daemon: the page, the API and the configured source of frames.
+    Run(run::Args),
 }
 
 impl Command {
@@ -34,6 +38,8 @@ impl Command {
         match self {
             Self::Doctor(args) => doctor::run(args, output),
             Self::Synth(args) => synth::run(args, output),
+            Self::Plants(args) => plants::run(args, output),
+            Self::Run(args) => run::run(args, output),
         }
     }
 }

@@ -3,9 +3,12 @@
 //! Start with [`cli`] for the commands and [`report`] for what they print.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod api;
 pub mod cli;
 pub mod commands;
+pub mod config;
 pub mod error;
+pub mod mesh_file;
 pub mod output;
 pub mod report;
 pub mod store;

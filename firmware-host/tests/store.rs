@@ -60,7 +60,7 @@ fn a_plant_is_saved_once_with_everything_that_belongs_to_it() {
     assert_eq!(reader.plant("row-0001").unwrap().unwrap(), expected);
     assert_eq!(reader.record("row-0001").unwrap().unwrap().record, plant.record);
     let file = reader.record("row-0001").unwrap().unwrap().species;
-    assert_eq!(blake3::hash(&file).to_hex().as_str(), bench.species_hash);
+    assert_eq!(blake3::hash(&file).to_hex().as_str(), bench.species.hash());
     assert_eq!(reader.thumbnail("row-0001").unwrap(), plant.thumbnail);
     assert_eq!(reader.plant("row-0002").unwrap(), None);
 }

@@ -144,6 +144,15 @@ impl Reader {
         statement.query_map([], plant_row).doing("listing plants")?.collect::<Result<_, _>>().doing("listing plants")
     }
 
+    /// The id of the oldest plant.
+    ///
+    /// # Errors
+    /// [`StoreError`] when the file cannot be read.
+    pub fn first(&self) -> Result<Option<String>, StoreError> {
+        let found = self.connection.query_row("SELECT id FROM plants ORDER BY seq LIMIT 1", [], |row| row.get(0));
+        found.optional().doing("looking for the first plant")
+    }
+
     /// A plant with its organs, `None` where the id is unknown.
     ///
     /// # Errors

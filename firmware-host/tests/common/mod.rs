@@ -5,13 +5,18 @@ use std::path::PathBuf;
 
 use demeter::report::{Kind, OrganReport, PlantReport, Quantity, Unit};
 use demeter::store::{NewPlant, NewSession, Store};
+use demeter_frame::Pose;
+use demeter_recon::model::leaf::Blade;
+use demeter_recon::model::{Form, Joint, Organ, Plant, Species};
 use demeter_recon::organs::ScaleSource;
+use demeter_recon::record::encode_compact;
+use glam::{DQuat, DVec3};
 
 pub(crate) struct Bench {
     pub(crate) folder: tempfile::TempDir,
     pub(crate) path: PathBuf,
     pub(crate) store: Store,
-    pub(crate) species_hash: String,
+    pub(crate) species: Species,
 }
 
 pub(crate) const MODEL: &str = "ab54d286dfd1a2d5e0c0c7e4b9c1f3c2aabbccddeeff00112233445566778899";
@@ -25,11 +30,11 @@ pub(crate) fn bench() -> Bench {
     store.save_model(MODEL, "organ2d").unwrap();
     let cameras = vec![("nadir".to_owned(), serde_json::json!({"fx": 500.0}))];
     store.save_session(&NewSession { id: "row".into(), rig: "rig-1".into(), cameras }).unwrap();
-    Bench { folder, path, store, species_hash: species.hash().to_owned() }
+    Bench { folder, path, store, species }
 }
 
 impl Bench {
-    /// Plant number `n` with two organs; its height is `n` centimetres.
+    /// Plant number `n` with two organs in its report; its height is `n` centimetres.
     pub(crate) fn plant(&self, n: u32) -> NewPlant {
         let quantity = |value, unit| Quantity { value, unit, sigma: Some(0.01) };
         let organ = |id, kind, parent, leaf| OrganReport {
@@ -42,12 +47,12 @@ impl Bench {
             visible_fraction: Some(0.5),
             traits: [("stem_length".into(), quantity(0.1, Unit::Metre))].into(),
         };
-        let record = vec![n as u8; 64];
+        let record = encode_compact(&model(n), &self.species, ScaleSource::GroundPlane).unwrap();
         NewPlant {
             report: PlantReport {
                 id: Some(format!("row-{n:04}")),
                 species: "soybean".into(),
-                species_hash: Some(self.species_hash.clone()),
+                species_hash: Some(self.species.hash().to_owned()),
                 organs: vec![organ(0, Kind::MainStem, None, None), organ(1, Kind::Leaf, Some(0), Some(0))],
                 traits: [
                     ("height".into(), quantity(f64::from(n) / 100.0, Unit::Metre)),
@@ -68,7 +73,7 @@ impl Bench {
             session: "row".into(),
             time: "2026-06-01T10:00:00Z".into(),
             time_trusted: true,
-            position: Some(glam::DVec3::new(0.25 * f64::from(n), 0.0, 0.0)),
+            position: Some(DVec3::new(0.25 * f64::from(n), 0.0, 0.0)),
             geographic: None,
             models: vec![MODEL.into()],
             provenance: serde_json::json!({"program": "0.1.0"}),
@@ -87,4 +92,24 @@ impl Bench {
         ["plants", "organs", "plant_models", "observations", "outbox"]
             .map(|table| self.number(&format!("SELECT count(*) FROM {table}")))
     }
+}
+
+/// A stem of `n` centimetres with three leaves on petioles.
+fn model(n: u32) -> Plant {
+    let stem = |parent, d, rotation, scale| Organ {
+        parent,
+        joint: Joint { d, rotation, scale },
+        form: Form::Stem { gamma: vec![], radius: 0.01 },
+    };
+    let mut organs = vec![stem(None, 0.0, DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2), f64::from(n) / 100.0)];
+    for leaf in 0..3 {
+        let turn = DQuat::from_rotation_y(2.4 * f64::from(leaf));
+        organs.push(stem(Some(0), 0.4 + 0.3 * f64::from(leaf), turn * DQuat::from_rotation_x(0.9), 0.5));
+        organs.push(Organ {
+            parent: Some(organs.len() - 1),
+            joint: Joint { d: 1.0, rotation: DQuat::from_rotation_x(0.5), scale: 0.9 },
+            form: Form::Leaf { blade: Blade { beta: vec![], gamma: vec![], width: 1.0 }, leaf: leaf as u16 },
+        });
+    }
+    Plant { world_from_plant: Pose::IDENTITY, organs }
 }

@@ -1,0 +1,112 @@
+//! The status API and the page (spec/appliance.md "Status API and page"): read-only, on loopback alone.
+//!
+//! The routes live in `plants` and `status`, the page's files in `page`; `guard` stands before all of them.
+
+mod guard;
+mod page;
+mod plants;
+mod reply;
+mod status;
+
+use std::future::Future;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use axum::Router;
+use axum::middleware::{from_fn, from_fn_with_state};
+use axum::routing::get;
+use metrics_exporter_prometheus::{PrometheusHandle, PrometheusRecorder};
+use tokio::net::TcpListener;
+
+use crate::store::{Reader, StoreError};
+use reply::ApiError;
+pub use status::{Activity, State};
+
+/// How long open connections may finish after the program was asked to stop: a guess.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// What every route works on; cheap to clone.
+#[derive(Clone)]
+pub struct Api {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    /// One reader: SQLite's calls block, so they run on tokio's threads for blocking work, one at a time.
+    reader: Mutex<Reader>,
+    activity: Activity,
+    recorder: Arc<PrometheusRecorder>,
+    metrics: PrometheusHandle,
+    port: u16,
+}
+
+impl Api {
+    /// An API over a store; `activity` is what the program says that it is doing, `address` where it listens.
+    #[must_use]
+    pub fn new(reader: Reader, activity: Activity, recorder: Arc<PrometheusRecorder>, address: SocketAddr) -> Self {
+        let (metrics, port) = (recorder.handle(), address.port());
+        Self { inner: Arc::new(Inner { reader: Mutex::new(reader), activity, recorder, metrics, port }) }
+    }
+
+    /// Answers requests until `stop` is done.
+    ///
+    /// # Errors
+    /// The listener's own.
+    pub async fn serve(
+        self,
+        listener: TcpListener,
+        stop: impl Future<Output = ()> + Send + 'static,
+    ) -> std::io::Result<()> {
+        let (stopping, stopped) = tokio::sync::oneshot::channel();
+        let signal = async move {
+            stop.await;
+            // The receiver waits as long as the server runs.
+            stopping.send(()).unwrap_or_default();
+        };
+        let server = axum::serve(listener, self.routes()).with_graceful_shutdown(signal);
+        tokio::select! {
+            result = server => result,
+            // A client that never closes must not keep the program.
+            () = async { stopped.await.unwrap_or_default(); tokio::time::sleep(GRACE).await } => Ok(()),
+        }
+    }
+
+    /// True while the store answers: the heartbeat of the watchdog.
+    pub async fn alive(&self) -> bool {
+        self.read(Reader::summary).await.is_ok()
+    }
+
+    fn routes(self) -> Router {
+        let v1 = Router::new()
+            .route("/status", get(status::status))
+            .route("/plants", get(plants::list))
+            .route("/plants/{id}", get(plants::show))
+            .route("/plants/{id}/mesh.glb", get(plants::mesh))
+            .route("/plants/{id}/record", get(plants::record))
+            .route("/plants/{id}/thumbnail", get(plants::thumbnail));
+        page::routes()
+            .route("/healthz", get(status::healthz))
+            .route("/metrics", get(status::metrics))
+            .nest("/api/v1", v1)
+            .fallback(async || ApiError::not_found("no such page"))
+            .method_not_allowed_fallback(async || ApiError::method())
+            .layer(from_fn_with_state(self.clone(), guard::host))
+            .layer(from_fn(guard::headers))
+            .with_state(self)
+    }
+
+    /// Reads the store off the async threads.
+    async fn read<T: Send + 'static>(
+        &self,
+        read: impl FnOnce(&Reader) -> Result<T, StoreError> + Send + 'static,
+    ) -> Result<T, ApiError> {
+        let inner = self.inner.clone();
+        // A panic while reading leaves a connection without a transaction, which is as good as new.
+        let call = move || read(&inner.reader.lock().unwrap_or_else(PoisonError::into_inner));
+        match tokio::task::spawn_blocking(call).await {
+            Ok(result) => Ok(result?),
+            Err(panic) => Err(ApiError::internal(&panic)),
+        }
+    }
+}

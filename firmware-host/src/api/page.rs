@@ -1,0 +1,25 @@
+//! The page's files, inside the program: it works without a network and without files beside it.
+
+use axum::Router;
+use axum::http::header::CONTENT_TYPE;
+use axum::routing::get;
+
+use super::Api;
+
+/// Path, type and bytes of each file.
+const FILES: [(&str, &str, &[u8]); 4] = [
+    ("/", "text/html; charset=utf-8", include_bytes!("../../../web/index.html")),
+    ("/app.js", "text/javascript; charset=utf-8", include_bytes!("../../../web/app.js")),
+    ("/style.css", "text/css; charset=utf-8", include_bytes!("../../../web/style.css")),
+    (
+        "/vendor/model-viewer.min.js",
+        "text/javascript; charset=utf-8",
+        include_bytes!("../../../web/vendor/model-viewer.min.js"),
+    ),
+];
+
+pub(super) fn routes() -> Router<Api> {
+    FILES.into_iter().fold(Router::new(), |router, (path, media, bytes)| {
+        router.route(path, get(move || async move { ([(CONTENT_TYPE, media)], bytes) }))
+    })
+}

@@ -1,0 +1,199 @@
+//! The configuration file: TOML, every key optional, unknown keys refused with a suggestion.
+
+use std::io::Read;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::error::CommandError;
+
+/// Where the service keeps its configuration; read when it is there and no other is named.
+const DEFAULT_PATH: &str = "/etc/demeter/demeter.toml";
+
+/// Largest file read, bytes: a guess a thousand times above any sensible configuration.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// What `demeter run` is told.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Where plants are kept.
+    pub store: StoreConfig,
+    /// Where the page and the API listen.
+    pub api: ApiConfig,
+}
+
+/// `[store]`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StoreConfig {
+    /// The SQLite file; relative to the working folder, which the service sets to /var/lib/demeter.
+    pub path: PathBuf,
+}
+
+impl Default for StoreConfig {
+    fn default() -> Self {
+        Self { path: "demeter.sqlite".into() }
+    }
+}
+
+/// `[api]`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ApiConfig {
+    /// Loopback only: the token that other networks need is not there yet.
+    pub listen: SocketAddr,
+}
+
+impl Default for ApiConfig {
+    fn default() -> Self {
+        Self { listen: (Ipv4Addr::LOCALHOST, 8420).into() }
+    }
+}
+
+/// Why a configuration is refused; every message names the file.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// It cannot be read.
+    #[error("configuration {path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's own error.
+        source: std::io::Error,
+    },
+    /// Larger than any configuration.
+    #[error("configuration {path}: expected at most {expected} bytes, found more")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The bound.
+        expected: u64,
+    },
+    /// No TOML, an unknown key or a value of the wrong type.
+    #[error("configuration {path}: {message}{suggestion}")]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// The line, what was expected and what was found.
+        message: String,
+        /// The known key that was probably meant.
+        suggestion: String,
+    },
+    /// A value that is understood and not allowed.
+    #[error("configuration {path}: `{key}`: expected {expected}, found {found}")]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The key.
+        key: &'static str,
+        /// What is allowed.
+        expected: &'static str,
+        /// What is there.
+        found: String,
+    },
+}
+
+impl From<ConfigError> for CommandError {
+    fn from(error: ConfigError) -> Self {
+        let usage = Self::usage("configuration", &error);
+        match error {
+            ConfigError::Value { expected, found, .. } => usage.with(expected, found),
+            _ => usage,
+        }
+    }
+}
+
+impl Config {
+    /// Reads the named file, else the service's where there is one, else nothing: the defaults run without editing.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming the file and the key.
+    pub fn load(path: Option<&Path>) -> Result<Self, ConfigError> {
+        match path {
+            Some(path) => Self::read(path),
+            None if Path::new(DEFAULT_PATH).exists() => Self::read(Path::new(DEFAULT_PATH)),
+            None => Ok(Self::default()),
+        }
+    }
+
+    fn read(path: &Path) -> Result<Self, ConfigError> {
+        let io = |source| ConfigError::Io { path: path.into(), source };
+        let mut text = String::new();
+        // Bounded by what is read and not by the size announced, which a pipe has not.
+        let file = std::fs::File::open(path).map_err(io)?;
+        let bytes = file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        if bytes as u64 > MAX_BYTES {
+            return Err(ConfigError::TooLarge { path: path.into(), expected: MAX_BYTES });
+        }
+        let config: Self = toml::from_str(&text).map_err(|error| ConfigError::Syntax {
+            path: path.into(),
+            message: error.to_string().trim_end().to_owned(),
+            suggestion: suggestion(error.message()).map_or_else(String::new, |key| format!("\ndid you mean `{key}`?")),
+        })?;
+        if !config.api.listen.ip().is_loopback() {
+            return Err(ConfigError::Value {
+                path: path.into(),
+                key: "api.listen",
+                expected: "a loopback address such as 127.0.0.1:8420",
+                found: config.api.listen.to_string(),
+            });
+        }
+        Ok(config)
+    }
+}
+
+/// The known key nearest to the unknown one, out of serde's message: it quotes the unknown key first, then the known.
+fn suggestion(message: &str) -> Option<&str> {
+    let mut quoted = message.strip_prefix("unknown field ")?.split('`').skip(1).step_by(2);
+    let unknown = quoted.next()?;
+    // A third of the letters may be wrong: beyond that a suggestion misleads.
+    let near = |key: &&str| strsim::damerau_levenshtein(unknown, key) <= unknown.len().max(3) / 3;
+    quoted.filter(near).min_by_key(|key| strsim::damerau_levenshtein(unknown, key))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Config, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        Config::load(Some(file.path())).map_err(|error| {
+            let error = CommandError::from(error);
+            assert_eq!(error.exit, crate::error::Exit::BadUse);
+            assert!(error.message.contains(&file.path().display().to_string()), "{}", error.message);
+            error.message
+        })
+    }
+
+    #[test]
+    fn an_empty_file_is_the_default_and_values_are_taken() {
+        assert_eq!(read(""), Ok(Config::default()));
+        let config = read("[store]\npath = 'x.sqlite'\n[api]\nlisten = '[::1]:80'").unwrap();
+        assert_eq!(config.store.path, Path::new("x.sqlite"));
+        assert_eq!(config.api.listen.port(), 80);
+    }
+
+    #[test]
+    fn mistakes_name_the_key_what_was_expected_and_what_was_found() {
+        for (text, parts) in [
+            ("[stroe]\npath = 'x'", &["stroe", "did you mean `store`?"][..]),
+            ("[api]\nlistn = '127.0.0.1:1'", &["listn", "did you mean `listen`?"]),
+            ("[harvester]", &["harvester", "expected `store` or `api`"]),
+            ("[store]\npath = 5", &["path = 5", "integer", "expected"]),
+            ("[api]\nlisten = 'here'", &["listen = 'here'", "address"]),
+            ("[api]\nlisten = '0.0.0.0:8420'", &["api.listen", "loopback", "0.0.0.0:8420"]),
+            ("[store", &["line 1"]),
+            ("\u{0}", &["line 1"]),
+        ] {
+            let message = read(text).unwrap_err();
+            assert!(parts.iter().all(|part| message.contains(part)), "{text}: {message}");
+        }
+        assert!(!read("[harvester]").unwrap_err().contains("did you mean"));
+        assert!(read(&format!("a = {}", "[".repeat(100_000))).is_err());
+        assert!(read(&"#".repeat(MAX_BYTES as usize + 1)).unwrap_err().contains("at most"));
+        assert!(Config::load(Some(Path::new("/no/such/file.toml"))).unwrap_err().to_string().contains("/no/such"));
+    }
+}
