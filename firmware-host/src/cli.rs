@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::{doctor, plants, run, synth};
+use crate::commands::{decode, doctor, fit, plants, run, synth};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -23,6 +23,10 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Turn a record back into its plant.
+    Decode(decode::Args),
+    /// Fit a point cloud.
+    Fit(fit::Args),
     /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
     Doctor(doctor::Args),
     /// Make synthetic plants, sessions, clouds and training pictures, with their truth.
@@ -36,6 +40,8 @@ enum Command {
 impl Command {
     fn run(&self, output: &Output) -> Result<Exit, CommandError> {
         match self {
+            Self::Decode(args) => decode::run(args, output),
+            Self::Fit(args) => fit::run(args, output),
             Self::Doctor(args) => doctor::run(args, output),
             Self::Synth(args) => synth::run(args, output),
             Self::Plants(args) => plants::run(args, output),

@@ -1,11 +1,11 @@
 //! What commands say of plants: plant.schema.json as types, and the same as a table.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use demeter_frame::{Intrinsics, Pose};
 use demeter_recon::model::OrganKind;
 use demeter_recon::organs::ScaleSource;
+use demeter_recon::traits::Traits;
 use serde::{Deserialize, Serialize};
 
 use crate::error::CommandError;
@@ -105,49 +105,6 @@ pub struct OrganReport {
     /// Its traits by key.
     #[serde(default)]
     pub traits: Traits,
-}
-
-/// Traits by their key of spec/reconstruction.md "Traits".
-pub type Traits = BTreeMap<String, Quantity>;
-
-/// A measured value.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Quantity {
-    /// The value.
-    pub value: f64,
-    /// Its unit.
-    pub unit: Unit,
-    /// Standard uncertainty in the same unit, `None` when it was not estimated.
-    pub sigma: Option<f64>,
-}
-
-/// The units of the contract.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Unit {
-    /// Metres.
-    #[serde(rename = "m")]
-    Metre,
-    /// Square metres.
-    #[serde(rename = "m2")]
-    SquareMetre,
-    /// Cubic metres.
-    #[serde(rename = "m3")]
-    CubicMetre,
-    /// Radians.
-    #[serde(rename = "rad")]
-    Radian,
-    /// A count or a ratio.
-    #[serde(rename = "1")]
-    One,
-    /// Per metre.
-    #[serde(rename = "1/m")]
-    PerMetre,
-}
-
-impl std::fmt::Display for Unit {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.serialize(f)
-    }
 }
 
 /// An organ's kind in the contract's words.

@@ -2,9 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 use demeter::error::{CommandError, Exit};
-use demeter::report::{Camera, Document, ErrorDocument, Kind, OrganReport, PlantReport, Quantity, Unit, table};
+use demeter::report::{Camera, Document, ErrorDocument, Kind, OrganReport, PlantReport, table};
 use demeter_frame::{Intrinsics, Pose};
 use demeter_recon::organs::ScaleSource;
+use demeter_recon::traits::{Quantity, Unit};
 
 fn plant() -> PlantReport {
     let quantity = |value, unit, sigma| Quantity { value, unit, sigma };

@@ -34,3 +34,28 @@ pub fn schema_document() -> Value {
 pub fn schema() -> jsonschema::Validator {
     jsonschema::validator_for(&schema_document()).expect("the contract is a valid JSON schema")
 }
+
+/// The program, as built beside these tests.
+///
+/// # Panics
+/// When it is not there: a workspace build makes it, a build of this crate alone does not.
+pub fn demeter() -> std::process::Command {
+    let tests = std::env::current_exe().expect("a test runs from a file");
+    let program = tests.ancestors().nth(2).expect("tests stand in target/PROFILE/deps").join("demeter");
+    assert!(program.is_file(), "{} does not exist: run `cargo build -p demeter`", program.display());
+    std::process::Command::new(program)
+}
+
+/// Runs the program with --json; its exit code and its answer, checked against the contract.
+///
+/// # Panics
+/// When the answer is no JSON or breaks the contract.
+pub fn answer(arguments: &[&str]) -> (Option<i32>, Value) {
+    let output = demeter().args(arguments).arg("--json").output().expect("the program starts");
+    let answer = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{arguments:?}: {error}: {}", String::from_utf8_lossy(&output.stderr)));
+    if let Err(error) = schema().validate(&answer) {
+        panic!("{arguments:?}: {error}");
+    }
+    (output.status.code(), answer)
+}

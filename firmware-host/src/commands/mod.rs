@@ -1,6 +1,8 @@
 //! One file a command: its arguments and what it does with them.
 
+pub mod decode;
 pub mod doctor;
+pub mod fit;
 pub mod plants;
 pub mod run;
 pub mod synth;

@@ -1,0 +1,146 @@
+//! `demeter fit`: a point cloud becomes a plant.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::ValueEnum;
+use demeter_recon::cloud::PointCloud;
+use demeter_recon::export::{PointOrgan, cloud_to_ply};
+use demeter_recon::model::OrganKind;
+use demeter_recon::organs::{OrganTree, ScaleSource};
+use demeter_recon::record::encode_exact;
+use demeter_recon::segment::{Labels, Up, segment};
+use demeter_recon::{fit, tree};
+use glam::DVec3;
+
+use crate::describe::describe;
+use crate::error::{CommandError, Exit};
+use crate::files;
+use crate::output::Output;
+use crate::report::Document;
+
+/// Arguments of `demeter fit`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The cloud: PLY, ascii or binary.
+    cloud: PathBuf,
+    /// Species to fit.
+    #[arg(long)]
+    species: String,
+    /// Organ labels: the cloud's own when it has them (auto), required (label), or found by geometry (none).
+    #[arg(long, value_enum, default_value_t)]
+    labels: LabelSource,
+    /// Unit of the cloud's coordinates.
+    #[arg(long, value_enum, default_value_t)]
+    unit: Unit,
+    /// The cloud's vertical axis.
+    #[arg(long, value_enum, default_value_t)]
+    up: Axis,
+    /// Where the record goes.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Write the exact encoding instead of the compact one.
+    #[arg(long)]
+    exact: bool,
+    /// Also write the plant's surface: .ply, .obj or .glb.
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+    /// Also write the input points, in order, with `organ` and `kind`.
+    #[arg(long)]
+    points: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum LabelSource {
+    #[default]
+    Auto,
+    Label,
+    None,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Unit {
+    #[default]
+    M,
+    Cm,
+    Mm,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Axis {
+    X,
+    Y,
+    #[default]
+    Z,
+    Auto,
+}
+
+/// Fits the cloud and writes what was asked for.
+///
+/// # Errors
+/// [`CommandError`] naming the file, option or reason.
+pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
+    let started = Instant::now();
+    let species = files::species(&args.species)?;
+    let mut cloud = PointCloud::from_ply(&files::read(&args.cloud)?).map_err(|error| args.refused("ply", &error))?;
+    let metres = match args.unit {
+        Unit::M => 1.0,
+        Unit::Cm => 1e-2,
+        Unit::Mm => 1e-3,
+    };
+    cloud.points.iter_mut().for_each(|p| *p *= metres);
+    let up = match args.up {
+        Axis::X => Up::Axis(DVec3::X),
+        Axis::Y => Up::Axis(DVec3::Y),
+        Axis::Z => Up::Axis(DVec3::Z),
+        Axis::Auto => Up::Auto,
+    };
+    let labels = match args.labels {
+        LabelSource::Auto => Labels::Auto,
+        LabelSource::Label => Labels::Own,
+        LabelSource::None => Labels::None,
+    };
+    let segmented = segment(&cloud, species.habit, labels, up).map_err(|error| args.refused("segmentation", &error))?;
+    let tree = tree::build(segmented.organs).map_err(|error| args.refused("topology", &error))?;
+    let fitted = fit::plant(&tree, &species, segmented.up).map_err(|error| args.refused("fit", &error))?;
+    let mut described = describe(&fitted, &species, &cloud.points, ScaleSource::Input)?;
+    let record = if args.exact {
+        encode_exact(&fitted.plant, &species, ScaleSource::Input)
+            .map_err(|error| CommandError::failed("record", &error))?
+    } else {
+        described.record
+    };
+    files::write(&args.output, &record)?;
+    if let Some(path) = &args.mesh {
+        files::write_mesh(path, &described.plant, &species)?;
+    }
+    if let Some(path) = &args.points {
+        files::write(path, &cloud_to_ply(&cloud, Some(&point_organs(&cloud, &tree, &fitted))))?;
+    }
+    described.report.record = Some(args.output.display().to_string());
+    described.report.ms = Some(started.elapsed().as_secs_f64() * 1e3);
+    let plants = vec![described.report];
+    output.plants(&Document { plants, warnings: Vec::new(), seconds: Some(started.elapsed().as_secs_f64()) })?;
+    Ok(Exit::Done)
+}
+
+impl Args {
+    fn refused(&self, kind: &'static str, error: &dyn std::error::Error) -> CommandError {
+        let mut refused = CommandError::failed(kind, error);
+        refused.message = format!("{}: {}", self.cloud.display(), refused.message);
+        refused
+    }
+}
+
+/// The organ of the record that each point was given to.
+fn point_organs(cloud: &PointCloud, tree: &OrganTree, fitted: &fit::Fitted) -> Vec<PointOrgan> {
+    // Labels of fewer points than an organ needs belong to none.
+    let mut organs = vec![PointOrgan { organ: -1, kind: OrganKind::Stem }; cloud.points.len()];
+    for (organ, fit) in fitted.organs.iter().enumerate() {
+        let Some(source) = fit.source.map(|k| &tree.organs[k]) else { continue };
+        for i in &source.source {
+            organs[*i as usize] = PointOrgan { organ: organ as i32, kind: source.kind };
+        }
+    }
+    organs
+}

@@ -1,0 +1,79 @@
+//! Files that commands read and write, with errors that name them.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+
+use demeter_recon::model::{Plant, Species};
+
+use crate::error::{CommandError, Exit};
+use crate::mesh_file::MeshFormat;
+
+/// Largest input file, bytes: 20 million points of a scan with colours and labels.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Reads a file whole.
+///
+/// # Errors
+/// [`CommandError`] `file` naming it when it cannot be read or is larger than 1 GiB.
+pub fn read(path: &Path) -> Result<Vec<u8>, CommandError> {
+    let failed = |error: std::io::Error| file_error(path, &error);
+    let mut bytes = Vec::new();
+    File::open(path).map_err(failed)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        let message = format!("{}: expected at most 1 GiB", path.display());
+        return Err(CommandError { exit: Exit::Failed, kind: "file", message, expected: None, found: None });
+    }
+    Ok(bytes)
+}
+
+/// Writes a file whole: beside its place first, so that nobody sees half of it.
+///
+/// # Errors
+/// [`CommandError`] `file` naming it.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let write = || {
+        let mut file = File::create(&beside)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        std::fs::rename(&beside, path)
+    };
+    write().map_err(|error| file_error(path, &error))
+}
+
+/// Writes a plant's mesh in the format that the path's extension names.
+///
+/// # Errors
+/// [`CommandError`] `usage` for any other extension, `file` when it cannot be written.
+pub fn write_mesh(path: &Path, plant: &Plant, species: &Species) -> Result<(), CommandError> {
+    let Some(format) = MeshFormat::of(path) else {
+        let (expected, found) = (".ply, .obj or .glb", path.display());
+        return Err(
+            CommandError::usage("usage", format!("--mesh: expected {expected}, found {found}")).with(expected, found)
+        );
+    };
+    let bytes = format.encode(plant, species).map_err(|error| CommandError::failed("mesh", &error))?;
+    write(path, &bytes)
+}
+
+/// The shipped species of that name.
+///
+/// # Errors
+/// [`CommandError`] `species` (exit 2) listing the names there are.
+pub fn species(name: &str) -> Result<Species, CommandError> {
+    let known = demeter_recon::species::NAMES.join(", ");
+    match demeter_recon::species::shipped(name) {
+        Some(species) => species.map_err(|error| CommandError::failed("species", &error)),
+        None => {
+            let message = format!("--species: expected one of {known}, found `{name}`");
+            Err(CommandError::usage("species", message).with(known, name))
+        }
+    }
+}
+
+fn file_error(path: &Path, error: &std::io::Error) -> CommandError {
+    let message = format!("{}: {error}", path.display());
+    CommandError { exit: Exit::Failed, kind: "file", message, expected: None, found: None }
+}
