@@ -3,13 +3,14 @@
 
 use std::path::PathBuf;
 
-use demeter::report::{Kind, OrganReport, PlantReport, Quantity, Unit};
+use demeter::report::{Kind, OrganReport, PlantReport};
 use demeter::store::{NewPlant, NewSession, Store};
 use demeter_frame::Pose;
 use demeter_recon::model::leaf::Blade;
 use demeter_recon::model::{Form, Joint, Organ, Plant, Species};
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::record::encode_compact;
+use demeter_recon::traits::{Quantity, Unit};
 use glam::{DQuat, DVec3};
 
 pub(crate) struct Bench {
