@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::{decode, doctor, fit, plants, run, synth};
+use crate::commands::{decode, doctor, fit, photo, plants, replay, run, synth};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -29,6 +29,10 @@ enum Command {
     Fit(fit::Args),
     /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
     Doctor(doctor::Args),
+    /// Reconstruct the plants of a photo.
+    Photo(photo::Args),
+    /// Run a recorded session into a store.
+    Replay(replay::Args),
     /// Make synthetic plants, sessions, clouds and training pictures, with their truth.
     Synth(synth::Args),
     /// List, show and export the plants of a store.
@@ -43,6 +47,8 @@ impl Command {
             Self::Decode(args) => decode::run(args, output),
             Self::Fit(args) => fit::run(args, output),
             Self::Doctor(args) => doctor::run(args, output),
+            Self::Photo(args) => photo::run(args, output),
+            Self::Replay(args) => replay::run(args, output),
             Self::Synth(args) => synth::run(args, output),
             Self::Plants(args) => plants::run(args, output),
             Self::Run(args) => run::run(args, output),

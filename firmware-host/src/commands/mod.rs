@@ -3,6 +3,8 @@
 pub mod decode;
 pub mod doctor;
 pub mod fit;
+pub mod photo;
 pub mod plants;
+pub mod replay;
 pub mod run;
 pub mod synth;

@@ -1,0 +1,177 @@
+//! `demeter photo`: the plants of one photograph.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use demeter_capture::decode_photo;
+use demeter_frame::{Intrinsics, Pose, Rgb};
+use demeter_recon::model::{Plant, Species};
+use demeter_recon::organs::ScaleSource;
+use glam::DVec3;
+
+use crate::describe::{Described, describe};
+use crate::error::{CommandError, Exit, chain};
+use crate::eye::{Eye, PlantSight};
+use crate::files;
+use crate::lens::{self, Lens};
+use crate::output::Output;
+use crate::picture::{draw_over, png};
+use crate::reconstruct::{ReconstructError, fit_organs};
+use crate::report::{Camera, Document};
+
+/// Most plants reported of one photo, the largest first: fields of hundreds of specks end somewhere.
+const MAX_PLANTS: usize = 64;
+
+/// Arguments of `demeter photo`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The photo, JPEG or PNG.
+    image: PathBuf,
+    /// The species it shows.
+    #[arg(long, default_value = "soybean")]
+    species: String,
+    /// The camera's intrinsics: a JSON file with width, height, fx, fy, cx, cy in pixels.
+    #[arg(long, conflicts_with = "hfov")]
+    calibration: Option<PathBuf>,
+    /// The camera's horizontal field of view, degrees.
+    #[arg(long, value_parser = clap::value_parser!(f64))]
+    hfov: Option<f64>,
+    /// Where the record goes; with --all a folder.
+    #[arg(short = 'o', value_name = "OUT")]
+    out: Option<PathBuf>,
+    /// All plants, not the largest alone.
+    #[arg(long)]
+    all: bool,
+    /// Where the largest plant's mesh goes: .ply, .obj or .glb.
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+    /// Where the photo with the fitted plants drawn over it goes: a PNG.
+    #[arg(long)]
+    overlay: Option<PathBuf>,
+}
+
+/// A plant fitted in the camera's frame.
+struct Fitted {
+    described: Described,
+    in_camera: Plant,
+}
+
+/// Reconstructs the largest plant of a photo, or all of them.
+///
+/// # Errors
+/// [`CommandError`] with kind `no_plant` when there is none, else naming what is wrong with the photo or the camera.
+pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
+    let started = Instant::now();
+    let species = files::species(&args.species)?;
+    let bytes = files::read(&args.image)?;
+    let photo = decode_photo(&bytes).map_err(|error| CommandError::failed("bad_image", &error))?;
+    let (photo, turned) = lens::upright(photo, &bytes);
+    let Lens { camera, warning } = lens::of(&photo, &bytes, turned, args.calibration.as_deref(), args.hfov)?;
+    let mut warnings: Vec<String> = warning.into_iter().collect();
+
+    let mut eye = Eye::open(NonZeroUsize::MIN).and_then(Eye::closer)?;
+    let sight = eye.look(&photo, &camera, None).map_err(|error| CommandError::failed(error.name(), &error))?;
+    let mut seen = sight.plants;
+    if seen.is_empty() {
+        let organs = sight.refused.iter().map(|r| r.instances.len()).sum::<usize>();
+        let why = sight.refused.first().map_or_else(|| "no organ large enough".into(), |r| r.reason.to_string());
+        return Err(CommandError {
+            exit: Exit::Failed,
+            kind: "no_plant",
+            message: format!("{}: no plant found: {why}", args.image.display()),
+            expected: Some("a plant with a leaf".into()),
+            found: Some(format!("{organs} organs and {} scraps", sight.dropped.len())),
+        });
+    }
+    if seen.len() > MAX_PLANTS {
+        warnings.push(format!("{} plants seen, the {MAX_PLANTS} largest kept", seen.len()));
+        seen.truncate(MAX_PLANTS);
+    }
+
+    let mut fitted = Vec::new();
+    let mut failures: Vec<ReconstructError> = Vec::new();
+    for sight in seen {
+        match fit(sight, &species, &camera) {
+            Ok(plant) => fitted.push(plant),
+            Err(error) => {
+                warnings.push(format!("a plant could not be fitted: {}", chain(&error)));
+                failures.push(error);
+            }
+        }
+        if !args.all && !fitted.is_empty() {
+            break;
+        }
+    }
+    if let (true, Some(error)) = (fitted.is_empty(), failures.first()) {
+        return Err(CommandError::failed(error.name(), error));
+    }
+    write(args, &mut fitted, &species, &photo, &camera)?;
+    let plants = fitted.into_iter().map(|plant| plant.described.report).collect();
+    let exit = if args.all && !failures.is_empty() { Exit::Partial } else { Exit::Done };
+    output.plants(&Document { plants, warnings, seconds: Some(started.elapsed().as_secs_f64()) })?;
+    Ok(exit)
+}
+
+fn fit(sight: PlantSight, species: &Species, camera: &Intrinsics) -> Result<Fitted, ReconstructError> {
+    let (stand_in, cut) = (sight.plant.stand_in, sight.plant.touches_border);
+    // Without a pose the camera is taken to be level: up is up in the picture.
+    let (mut fitted, mut cloud) = fit_organs(sight.plant.organs, species, DVec3::NEG_Y)?;
+    // The world is unknown: the plant is recorded at its own origin, and where that is seen from is reported.
+    let camera_from_plant = std::mem::replace(&mut fitted.plant.world_from_plant, Pose::IDENTITY);
+    let plant_from_camera = camera_from_plant.inverse();
+    cloud.iter_mut().for_each(|p| *p = plant_from_camera.point(*p));
+    let mut described = describe(&fitted, species, &cloud, ScaleSource::None)?;
+    described.report.camera = Some(Camera { intrinsics: *camera, camera_from_plant });
+    let in_camera = Plant { world_from_plant: camera_from_plant, ..described.plant.clone() };
+    let warnings = &mut described.report.warnings;
+    if stand_in {
+        warnings.push("no main stem was seen: one was put through the leaves' bases".into());
+    }
+    if cut {
+        warnings.push("the plant is cut by the photo's border".into());
+    }
+    Ok(Fitted { described, in_camera })
+}
+
+fn write(
+    args: &Args,
+    fitted: &mut [Fitted],
+    species: &Species,
+    photo: &Rgb,
+    camera: &Intrinsics,
+) -> Result<(), CommandError> {
+    if let Some(out) = &args.out {
+        if args.all {
+            std::fs::create_dir_all(out).map_err(|error| CommandError::failed("file", &error))?;
+        }
+        for (i, plant) in fitted.iter_mut().enumerate() {
+            let path = if args.all { out.join(format!("plant-{:03}.dmtr", i + 1)) } else { out.clone() };
+            files::write(&path, &plant.described.record)?;
+            plant.described.report.record = Some(path.display().to_string());
+        }
+    }
+    if let (Some(path), Some(largest)) = (&args.mesh, fitted.first()) {
+        files::write_mesh(path, &largest.described.plant, species)?;
+    }
+    if let Some(path) = &args.overlay {
+        write_overlay(path, fitted, species, photo, camera)?;
+    }
+    Ok(())
+}
+
+fn write_overlay(
+    path: &Path,
+    fitted: &[Fitted],
+    species: &Species,
+    photo: &Rgb,
+    camera: &Intrinsics,
+) -> Result<(), CommandError> {
+    let mut drawn = photo.clone();
+    // The largest plant is drawn last, over the others.
+    for plant in fitted.iter().rev() {
+        drawn = draw_over(&drawn, camera, &plant.in_camera, species, Pose::IDENTITY)
+            .map_err(|error| CommandError::failed("overlay", &error))?;
+    }
+    files::write(path, &png(&drawn).map_err(|error| CommandError::failed("overlay", &error))?)
+}

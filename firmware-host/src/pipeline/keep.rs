@@ -1,0 +1,128 @@
+//! The last stage: plants are fitted, pictured and stored.
+
+use std::time::Instant;
+
+use demeter_recon::view::Closed;
+use serde_json::{Value, json};
+
+use super::looker::{BestView, Found, FrameKey};
+use super::{Outcome, Progress, Run};
+use crate::describe::describe;
+use crate::error::chain;
+use crate::eye::Eye;
+use crate::picture;
+use crate::reconstruct::{ReconstructError, fit_organs};
+use crate::store::{NewPlant, StoreError};
+
+/// What every plant of the run depends on besides its frames.
+pub(super) fn provenance(eye: &Eye) -> Value {
+    let (model, sha256) = eye.model();
+    json!({"program": env!("CARGO_PKG_NAME"), "version": env!("CARGO_PKG_VERSION"), "model": model, "sha256": sha256})
+}
+
+pub(super) struct Keeper<'a> {
+    pub run: &'a Run<'a>,
+    pub provenance: Value,
+    pub model: String,
+    pub outcome: Outcome,
+}
+
+impl Keeper<'_> {
+    /// Takes what the looker found. Only the store's own failure is an error.
+    pub(super) fn take(&mut self, found: Found, progress: &mut impl FnMut(Progress<'_>)) -> Result<(), StoreError> {
+        match found {
+            Found::Seen { milliseconds } => {
+                tracing::debug!(milliseconds, "frame");
+                self.outcome.frames += 1;
+                progress(Progress::Frame);
+            }
+            Found::Refused { frame, reason, message } => {
+                self.outcome.frames += 1;
+                self.note("frame_refused", &json!({"frame": frame, "reason": reason, "message": message}))?;
+                progress(Progress::Frame);
+            }
+            Found::Unseen { frame: (camera, seq), reason, message } => {
+                // A plant without a place is one of a frame that was counted as seen.
+                if reason != "no_place" {
+                    self.outcome.frames += 1;
+                    progress(Progress::Frame);
+                }
+                *self.outcome.unseen.entry(reason).or_default() += 1;
+                let detail = json!({"frame": [camera.0, seq], "reason": reason, "message": message});
+                self.note("frame_unseen", &detail)?;
+            }
+            Found::Plant(plant) => self.plant(&plant, progress)?,
+        }
+        Ok(())
+    }
+
+    fn plant(
+        &mut self,
+        closed: &Closed<FrameKey, BestView>,
+        progress: &mut impl FnMut(Progress<'_>),
+    ) -> Result<(), StoreError> {
+        let started = Instant::now();
+        let id = format!("{}-{:04}", self.run.manifest.session_id, closed.number);
+        let mut plant = match self.new_plant(closed, id.clone()) {
+            Ok(plant) => plant,
+            Err(error) => {
+                *self.outcome.lost.entry(error.name()).or_default() += 1;
+                tracing::warn!("plant {id}: {}", chain(&error));
+                return self
+                    .note("plant_lost", &json!({"plant": id, "reason": error.name(), "message": chain(&error)}));
+            }
+        };
+        match self.run.store.save_plant(&plant) {
+            // A value that the store does not take costs this plant; a store that does not work ends the run.
+            Err(error @ (StoreError::Value { .. } | StoreError::Conflict { .. })) => {
+                *self.outcome.lost.entry("not_stored").or_default() += 1;
+                tracing::warn!("plant {id}: {}", chain(&error));
+                self.note("plant_lost", &json!({"plant": id, "reason": "not_stored", "message": chain(&error)}))
+            }
+            Err(error) => Err(error),
+            Ok(_) => {
+                let milliseconds = started.elapsed().as_secs_f64() * 1e3;
+                self.note("plant_stored", &json!({"plant": id, "ms": milliseconds}))?;
+                plant.report.ms = Some(milliseconds);
+                progress(Progress::Plant(&plant.report));
+                self.outcome.plants.push(plant.report);
+                Ok(())
+            }
+        }
+    }
+
+    fn new_plant(&self, closed: &Closed<FrameKey, BestView>, id: String) -> Result<NewPlant, ReconstructError> {
+        let (best, species) = (&closed.best, self.run.species);
+        let (fitted, cloud) = fit_organs(best.organs.clone(), species, glam::DVec3::Z)?;
+        let mut made = describe(&fitted, species, &cloud, best.scale_source)?;
+        made.report.id = Some(id);
+        if best.stand_in {
+            made.report.warnings.push("no main stem was seen: one was put through the leaves' bases".into());
+        }
+        if !best.whole {
+            made.report.warnings.push("the plant was never whole in a picture".into());
+        }
+        let beside = best.crop.beside(&made.plant, species, best.world_from_camera.inverse())?;
+        let mut provenance = self.provenance.clone();
+        let (camera, seq) = &closed.best_frame;
+        provenance["best_frame"] = json!([camera.0, seq]);
+        Ok(NewPlant {
+            report: made.report,
+            record: made.record,
+            session: self.run.manifest.session_id.clone(),
+            time: best.stamp.wall.clone(),
+            // A recording does not say whether its clock was synchronised.
+            time_trusted: false,
+            position: Some(closed.position.extend(0.0)),
+            geographic: None,
+            models: vec![self.model.clone()],
+            provenance,
+            observations: closed.frames.iter().map(|(camera, seq)| (camera.0.clone(), *seq)).collect(),
+            thumbnail: picture::png(&beside).ok(),
+        })
+    }
+
+    fn note(&self, kind: &str, detail: &Value) -> Result<(), StoreError> {
+        self.run.store.save_event(jiff::Timestamp::now(), kind, detail)
+    }
+}

@@ -1,0 +1,144 @@
+//! The second stage: network, lifting, and which plant along the row each sight belongs to.
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{Receiver, SyncSender};
+use std::time::Instant;
+
+use demeter_capture::Manifest;
+use demeter_frame::{CameraId, Frame, Pose, Rgb, Stamp};
+use demeter_recon::organs::{OrganCloud, ScaleSource};
+use demeter_recon::view::{Closed, Gate, Observation, Quality, Tracker};
+use glam::DVec2;
+
+use super::reader::Arrival;
+use crate::error::chain;
+use crate::eye::{Eye, Sight};
+use crate::picture::Crop;
+
+/// A frame's name.
+pub(super) type FrameKey = (CameraId, u64);
+
+/// What is kept of a plant's best view.
+#[derive(Clone, Debug)]
+pub(super) struct BestView {
+    pub organs: Vec<OrganCloud>,
+    pub stand_in: bool,
+    pub whole: bool,
+    pub scale_source: ScaleSource,
+    pub world_from_camera: Pose,
+    pub crop: Crop,
+    pub stamp: Stamp,
+}
+
+/// What leaves the stage, in the order of the frames.
+pub(super) enum Found {
+    /// A frame showed something.
+    Seen { milliseconds: f64 },
+    /// A frame was refused at the gate.
+    Refused { frame: Option<(String, u64)>, reason: &'static str, message: String },
+    /// A frame passed the gate and showed nothing.
+    Unseen { frame: FrameKey, reason: &'static str, message: String },
+    /// The rig has passed a plant.
+    Plant(Box<Closed<FrameKey, BestView>>),
+}
+
+/// The stage's state.
+pub(super) struct Looker<'a> {
+    manifest: &'a Manifest,
+    eye: &'a mut Eye,
+    tracker: Tracker<FrameKey, BestView>,
+    odometer: Odometer,
+}
+
+impl<'a> Looker<'a> {
+    pub(super) fn new(manifest: &'a Manifest, eye: &'a mut Eye) -> Self {
+        let spacing = manifest.rows.iter().filter_map(|row| row.plant_spacing_m).reduce(f64::min);
+        Self { manifest, eye, tracker: Tracker::new(Gate::of_spacing(spacing)), odometer: Odometer::default() }
+    }
+
+    /// Works until no more frames come or nobody listens.
+    pub(super) fn look(mut self, frames: Receiver<Arrival>, to: &SyncSender<Found>) {
+        for arrival in frames {
+            let found = match arrival {
+                Arrival::Refused { frame, reason, message } => vec![Found::Refused { frame, reason, message }],
+                Arrival::Frame(frame, rgb) => self.frame(&frame, &rgb),
+            };
+            if found.into_iter().any(|found| to.send(found).is_err()) {
+                return;
+            }
+        }
+        for plant in self.tracker.finish() {
+            if to.send(Found::Plant(Box::new(plant))).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame, rgb: &Rgb) -> Vec<Found> {
+        let key = (frame.camera.clone(), frame.seq);
+        let unseen = |reason, message| vec![Found::Unseen { frame: key.clone(), reason, message }];
+        let Some(camera) = self.manifest.camera(&frame.camera) else {
+            return unseen("unknown_camera", format!("camera {} is not in the session", frame.camera));
+        };
+        let Some(pose) = frame.world_from_camera else {
+            return unseen("no_pose", "the session has no pose for the frame, so its plants have no place".into());
+        };
+        let started = Instant::now();
+        let sight = match self.eye.look(rgb, &camera.intrinsics, Some(pose)) {
+            Ok(sight) => sight,
+            Err(error) => return unseen(error.name(), chain(&error)),
+        };
+        let travelled = self.odometer.advance(&frame.camera, pose.translation.truncate());
+        let seen = observations(sight, frame, rgb, &camera.intrinsics, pose);
+        let (closed, misplaced) = self.tracker.frame(&key, travelled, seen);
+        let mut found = vec![Found::Seen { milliseconds: started.elapsed().as_secs_f64() * 1e3 }];
+        if !misplaced.is_empty() {
+            let message = format!("{} plants without a finite place", misplaced.len());
+            found.push(Found::Unseen { frame: key, reason: "no_place", message });
+        }
+        found.extend(closed.into_iter().map(|plant| Found::Plant(Box::new(plant))));
+        found
+    }
+}
+
+fn observations(
+    sight: Sight,
+    frame: &Frame,
+    rgb: &Rgb,
+    camera: &demeter_frame::Intrinsics,
+    world_from_camera: Pose,
+) -> Vec<Observation<BestView>> {
+    let scale_source = sight.scale_source;
+    let observation = |seen: crate::eye::PlantSight| {
+        let whole = !seen.plant.touches_border;
+        Observation {
+            position: seen.ground,
+            quality: Quality { whole, pixels: seen.plant.pixels, off_centre: seen.off_centre },
+            view: BestView {
+                organs: seen.plant.organs,
+                stand_in: seen.plant.stand_in,
+                whole,
+                scale_source,
+                world_from_camera,
+                crop: Crop::around(rgb, camera, seen.bounds),
+                stamp: frame.stamp.clone(),
+            },
+        }
+    };
+    sight.plants.into_iter().map(observation).collect()
+}
+
+/// How far the rig has gone: the longest way of any of its cameras over the ground, metres.
+#[derive(Debug, Default)]
+struct Odometer {
+    cameras: BTreeMap<CameraId, (DVec2, f64)>,
+}
+
+impl Odometer {
+    fn advance(&mut self, camera: &CameraId, at: DVec2) -> f64 {
+        let (last, way) = self.cameras.entry(camera.clone()).or_insert((at, 0.0));
+        *way += last.distance(at);
+        *last = at;
+        self.cameras.values().map(|(_, way)| *way).fold(0.0, f64::max)
+    }
+}
