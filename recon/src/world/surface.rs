@@ -58,20 +58,22 @@ fn soil(p: Vec2, colour: Vec3, [stones, straw, weeds]: [f32; 3], seed: u32) -> V
     let crumbs = fractal(p * 40.0, 3, seed);
     let patches = noise(p * 3.0, seed ^ 1);
     let mut c = colour * (0.35 + 1.0 * crumbs + 0.3 * patches);
-    // Warping makes stones and leaves of round pebbles.
-    let warp = |by: f32, s: u32| Vec2::new(noise(p * 55.0, seed ^ s), noise(p * 55.0, seed ^ s ^ 64)) * by;
-    let (inside, h) = pebble((p + warp(0.03, 11)) / 0.04, 1.0, stones, seed ^ 2);
-    if inside > 0.05 {
-        let grey = 0.12 + 0.4 * unit(h.rotate_left(9));
-        c = Vec3::new(1.0, 0.96, 0.9) * grey * (0.55 + 0.6 * inside.min(0.6) + 0.3 * crumbs);
+    if stones + weeds > 0.0 {
+        // Warping makes stones and leaves of round pebbles.
+        let warp = Vec2::new(noise(p * 55.0, seed ^ 11), crumbs) * 0.03;
+        let (inside, h) = pebble((p + warp) / 0.04, 1.0, stones, seed ^ 2);
+        if inside > 0.05 {
+            let grey = 0.12 + 0.4 * unit(h.rotate_left(9));
+            c = Vec3::new(1.0, 0.96, 0.9) * grey * (0.55 + 0.6 * inside.min(0.6) + 0.3 * crumbs);
+        }
+        let (inside, h) = pebble((p + warp) / 0.09, 2.5, weeds, seed ^ 4);
+        if inside > 0.45 {
+            c = Vec3::new(0.10, 0.2, 0.05) * (0.4 + unit(h.rotate_left(5)));
+        }
     }
     let (inside, h) = pebble(p / 0.07, 9.0, straw, seed ^ 3);
     if inside > 0.1 {
         c = Vec3::new(0.42, 0.33, 0.17) * (0.5 + unit(h.rotate_left(7)));
-    }
-    let (inside, h) = pebble((p + warp(0.04, 13)) / 0.09, 2.5, weeds, seed ^ 4);
-    if inside > 0.45 {
-        c = Vec3::new(0.10, 0.2, 0.05) * (0.4 + unit(h.rotate_left(5)));
     }
     c
 }
