@@ -19,3 +19,4 @@ pub mod pipeline;
 pub mod reconstruct;
 pub mod report;
 pub mod store;
+pub mod synthetic;

@@ -163,6 +163,7 @@ impl Scene {
             looks: vec![pot],
             shadow: Shadow::none(),
         };
+        let variety = Variety::random(&mut rng);
         for (plant, (species, parameters)) in plants.into_iter().enumerate() {
             let posed = forward(&parameters, species).map_err(|error| WorldError::Plant { plant, error })?;
             let first = scene.looks.len();
@@ -171,7 +172,7 @@ impl Scene {
                 return Err(WorldError::TooManyOrgans { expected: usize::from(u16::MAX), found });
             }
             let mesh = PlantMesh::of(&posed, detail, Knots::Uniform);
-            scene.looks.extend(looks(&parameters, plant as u32, &mut rng));
+            scene.looks.extend(looks(&parameters, &variety, plant as u32, &mut rng));
             scene.add(&mesh, |face| (first + mesh.organ_of_face[face] as usize) as u16);
             if let Some(pot) = setting.pot {
                 let mesh = pot_mesh(pot, parameters.world_from_plant.translation.as_vec3());
@@ -206,20 +207,46 @@ impl Scene {
     }
 }
 
-/// Colours of a plant's organs: its own green, each organ a little different, the lowest leaves sometimes yellow.
-/// Reflectances are about those of green leaves in red, green and blue (a guess from photographs).
-fn looks(plant: &Plant, index: u32, rng: &mut Seeded) -> Vec<Look> {
-    let shift = |rng: &mut Seeded, by: f32| 1.0 + by * (2.0 * rng.random::<f32>() - 1.0);
-    let green = Vec3::new(0.075 * shift(rng, 0.5), 0.19 * shift(rng, 0.4), 0.035 * shift(rng, 0.5));
-    let stem = green.lerp(Vec3::new(0.22, 0.30, 0.11), rng.random_range(0.1..0.8));
-    let purple = if rng.random_bool(0.25) { rng.random_range(0.0..0.8) } else { 0.0 };
+/// What the plants of one scene share: they are of one variety. Reflectances are about those of green leaves in red,
+/// green and blue (a guess from photographs).
+struct Variety {
+    green: Vec3,
+    stem: Vec3,
+    /// How far main stems go to purple, 0..=1.
+    purple: f32,
+    vein: f32,
+    gloss: f32,
+}
+
+impl Variety {
+    fn random(rng: &mut Seeded) -> Self {
+        // Yellower greens are also lighter.
+        let green = Vec3::new(0.055, 0.15, 0.035).lerp(Vec3::new(0.13, 0.26, 0.045), rng.random());
+        let green = green * Vec3::new(shift(rng, 0.15), shift(rng, 0.15), shift(rng, 0.4));
+        Self {
+            green,
+            stem: green.lerp(Vec3::new(0.22, 0.30, 0.11), rng.random_range(0.1..0.8)),
+            purple: if rng.random_bool(0.25) { rng.random_range(0.0..0.8) } else { 0.0 },
+            vein: rng.random_range(0.1..0.9),
+            gloss: rng.random_range(0.02..0.2),
+        }
+    }
+}
+
+/// A factor around 1.
+fn shift(rng: &mut Seeded, by: f32) -> f32 {
+    1.0 + by * (2.0 * rng.random::<f32>() - 1.0)
+}
+
+/// Colours of a plant's organs: each plant and organ a little different, the lowest leaves sometimes yellow.
+fn looks(plant: &Plant, variety: &Variety, index: u32, rng: &mut Seeded) -> Vec<Look> {
+    let own = Vec3::new(shift(rng, 0.12), shift(rng, 0.1), shift(rng, 0.12));
     let yellow = if rng.random_bool(0.3) { rng.random_range(0.0..0.9) } else { 0.0 };
-    let (vein, gloss) = (rng.random_range(0.1..0.9), rng.random_range(0.02..0.2));
     let organs = plant.organs.iter().enumerate().map(|(organ, parameters)| {
         let (semantic, colour) = match parameters.kind() {
-            OrganKind::MainStem => (Semantic::MainStem, stem.lerp(Vec3::new(0.13, 0.04, 0.05), purple)),
-            OrganKind::Stem => (Semantic::Stem, stem),
-            OrganKind::Leaf => (Semantic::Leaf, green),
+            OrganKind::MainStem => (Semantic::MainStem, variety.stem.lerp(Vec3::new(0.13, 0.04, 0.05), variety.purple)),
+            OrganKind::Stem => (Semantic::Stem, variety.stem),
+            OrganKind::Leaf => (Semantic::Leaf, variety.green),
         };
         let low = 1.0 - organ as f32 / plant.organs.len() as f32;
         let spots: f32 = rng.random();
@@ -227,10 +254,10 @@ fn looks(plant: &Plant, index: u32, rng: &mut Seeded) -> Vec<Look> {
             semantic,
             plant: index,
             organ: organ as u32,
-            colour: colour * shift(rng, 0.22),
-            vein,
+            colour: colour * own * shift(rng, 0.2),
+            vein: variety.vein,
             yellow: yellow * low * low * spots,
-            gloss,
+            gloss: variety.gloss,
             seed: rng.random(),
         }
     });
