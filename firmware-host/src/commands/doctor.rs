@@ -1,13 +1,29 @@
 //! `demeter doctor`: what works on this box and how to mend what does not.
 
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use demeter_models::{Organ2d, Runtime, find_manifest};
 use serde::Serialize;
 
-use crate::error::{CommandError, Exit};
+use crate::config::Config;
+use crate::error::{CommandError, Exit, chain};
 use crate::output::Output;
+use crate::store::{Reader, StoreError};
+
+/// Free bytes below which the disk is said to be full: a guess at a day of plants with their pictures.
+const MIN_FREE: u64 = 1 << 30;
 
 /// Arguments of `demeter doctor`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The configuration that `demeter run` would be given.
+    #[arg(long)]
+    config: Option<PathBuf>,
+    /// The store, instead of the configuration's.
+    #[arg(long)]
+    db: Option<PathBuf>,
+}
 
 /// One thing looked at.
 #[derive(Debug, Serialize)]
@@ -23,12 +39,49 @@ struct Check {
     mend: Option<String>,
 }
 
+impl Check {
+    fn new(name: &'static str, result: Result<String, Trouble>) -> Self {
+        match result {
+            Ok(found) => Self { name, ok: true, found, mend: None },
+            Err(Trouble { found, mend }) => Self { name, ok: false, found, mend: Some(mend) },
+        }
+    }
+}
+
+/// What does not work, and how to mend it.
+struct Trouble {
+    found: String,
+    mend: String,
+}
+
+impl Trouble {
+    fn new(error: &dyn std::error::Error, mend: &str) -> Self {
+        Self { found: chain(error), mend: mend.into() }
+    }
+}
+
 /// Looks at everything and prints one line each.
 ///
 /// # Errors
 /// [`CommandError`] when the answer cannot be written. What does not work is in the answer and ends with exit 1.
-pub fn run(_args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    let checks = [species()];
+pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
+    let config = Config::load(args.config.as_deref());
+    let store = args.db.clone().or(config.as_ref().ok().map(|config| config.store.path.clone()));
+    let config =
+        config.map_err(|error| Trouble::new(&error, "correct the line, or remove it: every key has a default"));
+    let mut checks = vec![Check::new("configuration", config.map(|config| format!("page on {}", config.api.listen)))];
+    if let Some(path) = store {
+        checks.push(Check::new("store", check_store(&path)));
+        checks.push(Check::new("disk", check_disk(&path)));
+    }
+    let runtime = Runtime::load(None);
+    let organs = runtime.as_ref().ok().map(|runtime| Check::new("network organ2d", check_organ2d(runtime)));
+    let library = runtime.map(|runtime| format!("{}, {}", runtime.library().display(), runtime.build_info()));
+    let mend = "run tools/fetch-onnxruntime.sh, or point DEMETER_ONNXRUNTIME to libonnxruntime.so";
+    checks.push(Check::new("ONNX Runtime", library.map_err(|error| Trouble::new(&error, mend))));
+    checks.extend(organs);
+    checks.push(Check::new("species", check_species()));
+
     if output.json {
         output.json(&serde_json::json!({"checks": checks}))?;
     } else {
@@ -43,7 +96,46 @@ pub fn run(_args: &Args, output: &Output) -> Result<Exit, CommandError> {
     Ok(if checks.iter().all(|check| check.ok) { Exit::Done } else { Exit::Failed })
 }
 
-fn species() -> Check {
-    let found = demeter_recon::species::NAMES.join(", ");
-    Check { name: "species", ok: true, found, mend: None }
+fn check_store(path: &Path) -> Result<String, Trouble> {
+    let at = path.display();
+    match Reader::open(path).and_then(|reader| reader.summary()) {
+        Ok(summary) => Ok(format!("{at}: {} plants, {} not sent yet", summary.plants, summary.unsent)),
+        Err(StoreError::Missing { .. }) => Ok(format!("{at}: not there yet, the first run makes it")),
+        Err(error @ StoreError::NewerSchema { .. }) => {
+            Err(Trouble::new(&error, "install the newer program again, or name another file with --db"))
+        }
+        Err(error @ StoreError::NotAStore { .. }) => {
+            Err(Trouble::new(&error, "move the file away, or name another with --db"))
+        }
+        Err(error) => Err(Trouble::new(&error, "see that this user may read and write the file and its folder")),
+    }
+}
+
+fn check_disk(store: &Path) -> Result<String, Trouble> {
+    let folder = store.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = folder.display();
+    let space = rustix::fs::statvfs(folder)
+        .map_err(|error| Trouble { found: format!("{name}: {error}"), mend: "make the folder".into() })?;
+    let free = space.f_bavail.saturating_mul(space.f_frsize);
+    let found = format!("{name}: {:.1} GB free", free as f64 / 1e9);
+    if free < MIN_FREE { Err(Trouble { found, mend: "free at least 1 GiB".into() }) } else { Ok(found) }
+}
+
+fn check_organ2d(runtime: &Runtime) -> Result<String, Trouble> {
+    let mend = "install the models folder beside the program, or point DEMETER_MODELS to it";
+    let manifest = find_manifest("organ2d").map_err(|error| Trouble::new(&error, mend))?;
+    // Opening verifies the file's hash, its inputs and its outputs.
+    Organ2d::open(runtime, &manifest, NonZeroUsize::MIN)
+        .map_err(|error| Trouble::new(&error, "install the file that the manifest describes"))?;
+    Ok(manifest.display().to_string())
+}
+
+fn check_species() -> Result<String, Trouble> {
+    for name in demeter_recon::species::NAMES {
+        let species = demeter_recon::species::shipped(name);
+        if let Some(Err(error)) = species {
+            return Err(Trouble::new(&error, "install the program again: its species are part of it"));
+        }
+    }
+    Ok(demeter_recon::species::NAMES.join(", "))
 }

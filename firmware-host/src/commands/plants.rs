@@ -4,9 +4,11 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, ValueEnum};
+use serde::Serialize;
 use serde_json::json;
 
 use crate::error::{CommandError, Exit};
+use crate::files;
 use crate::mesh_file::MeshFormat;
 use crate::output::Output;
 use crate::report::{Document, PlantReport, columns};
@@ -106,14 +108,14 @@ fn show(reader: &Reader, id: &str, picture: Option<&Path>, output: &Output) -> R
             exit: Exit::Failed,
             ..CommandError::usage("no_picture", format!("plant `{id}` was stored without a picture"))
         };
-        write(path, &reader.thumbnail(&id)?.ok_or_else(none)?)?;
+        files::write(path, &reader.thumbnail(&id)?.ok_or_else(none)?)?;
     }
     let traits: Vec<_> = plant
         .traits
         .iter()
         .map(|(key, q)| {
             let sigma = q.sigma.map_or_else(|| "-".into(), |sigma| format!("{sigma:.4}"));
-            [key.clone(), q.unit.to_string(), format!("{:.4}", q.value), sigma]
+            [key.clone(), word(&q.unit), format!("{:.4}", q.value), sigma]
         })
         .collect();
     output.plants(&Document { plants: vec![plant], ..Document::default() })?;
@@ -125,29 +127,24 @@ fn show(reader: &Reader, id: &str, picture: Option<&Path>, output: &Output) -> R
 
 fn table(text: &str, target: Option<&Path>, output: &Output) -> Result<(), CommandError> {
     match target {
-        Some(path) => write(path, text.as_bytes()),
+        Some(path) => files::write(path, text.as_bytes()),
         None => output.text(text),
     }
 }
 
 fn meshes(reader: &Reader, rows: &[PlantRow], format: MeshFormat, target: Option<&Path>) -> Result<(), CommandError> {
     let folder = target.unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+    std::fs::create_dir_all(folder).map_err(|error| CommandError {
+        message: format!("{}: {error}", folder.display()),
+        ..CommandError::failed("file", &error)
+    })?;
     for row in rows {
         let Some(stored) = reader.record(&row.id)? else { continue };
         let mesh = format.encode_stored(&stored).map_err(|error| CommandError::failed("record", &error))?;
         // Ids hold no path separators: the store refuses them.
-        write(&folder.join(format!("{}.{}", row.id, format.extension())), &mesh)?;
+        files::write(&folder.join(format!("{}.{}", row.id, format.extension())), &mesh)?;
     }
     Ok(())
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
-    std::fs::write(path, bytes).map_err(|error| unwritten(path, &error))
-}
-
-fn unwritten(path: &Path, error: &std::io::Error) -> CommandError {
-    CommandError { message: format!("{}: {error}", path.display()), ..CommandError::failed("output", error) }
 }
 
 fn csv(rows: &[PlantRow]) -> String {
@@ -159,14 +156,13 @@ fn csv(rows: &[PlantRow]) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
         let at = |i: usize| number(row.position.map(|p| p[i]));
         let on_earth = |i: usize| number(row.geographic.map(|g| g[i]));
-        let scale = json!(row.scale_source);
         let cells = [
             quoted(&row.id),
             quoted(&row.session),
             quoted(&row.species),
             quoted(&row.time),
             row.time_trusted.to_string(),
-            scale.as_str().unwrap_or_default().to_owned(),
+            word(&row.scale_source),
             at(0),
             at(1),
             at(2),
@@ -183,6 +179,11 @@ fn csv(rows: &[PlantRow]) -> String {
         writeln!(text, "{}", cells.join(",")).unwrap_or_default();
     }
     text
+}
+
+/// The contract's word for a plain enum.
+fn word(value: &impl Serialize) -> String {
+    json!(value).as_str().unwrap_or_default().to_owned()
 }
 
 /// A CSV cell (RFC 4180).
