@@ -2,7 +2,8 @@
 
 A folder holds meta.json and, for n images of h x w pixels, raw row-major arrays: rgb.u8 [n, h, w, 3]; sem.u8 [n, h, w]
 (0 background, 1 leaf, 2 stem, 3 main stem); dist.u8 [n, h, w], truncated inverse distance to the nearest pixel of
-another organ, times 255; depth.u16 [n, h, w], 0 for none, else 1 + 65534 (ln z - ln 0.05) / (ln 50 - ln 0.05), z in metres.
+another organ, times 255; depth.u16 [n, h, w], 0 for none, else 1 + 65534 (ln z - ln 0.05) / (ln 50 - ln 0.05), z in
+metres.
 """
 
 import hashlib

@@ -23,7 +23,7 @@ from images import IGNORED, LOG_FAR, LOG_NEAR, SIDE, Folder, Randomised, tensors
 from losses import Figures, depth_loss, dist_loss, semantic_loss
 from network import CLASSES, Organ2d
 
-BATCH = 16
+BATCH = 8
 LEARNING_RATE = 2e-3
 WARM_UP_STEPS = 100
 SAVE_EVERY_SECS = 60
