@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFilter
 
-SIDE = 256
+SIDE = 192
 IGNORED = 255
 HELD_OUT = 0.03
 LOG_NEAR, LOG_FAR = np.log(0.05), np.log(50.0)

@@ -1,0 +1,91 @@
+//! The shipped network computes in Rust what it computed in Python.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::num::NonZeroUsize;
+
+use demeter_frame::Rgb;
+use demeter_models::{Model, Organ2d, Runtime, find_manifest};
+use ndarray::{Array4, s};
+use serde::Deserialize;
+
+/// Largest difference allowed between ONNX Runtime here and PyTorch there, both in single precision, in each output's
+/// own unit (logits, 0..=1, log depth). Kernels differ in the order of their sums and in how they fold batch
+/// normalisation: some thousand terms a sum over thirty layers may cost 1e-4 of logits near ten on another processor's
+/// kernels. Measured on x86-64 with AVX-512: 1e-6.
+const TOLERANCE: f32 = 1e-3;
+
+#[derive(Deserialize)]
+struct Pins {
+    height: usize,
+    width: usize,
+    pins: Vec<Pin>,
+}
+
+#[derive(Deserialize)]
+struct Pin {
+    output: String,
+    at: [usize; 3],
+    value: f32,
+}
+
+/// `pinned_image` of models/training/export.py.
+fn image(pins: &Pins) -> Array4<f32> {
+    Array4::from_shape_fn((1, 3, pins.height, pins.width), |(_, c, y, x)| {
+        ((x * x * (c + 1) + y * y * (3 - c) + 17 * x * y) % 251) as f32 / 250.0
+    })
+}
+
+fn pins() -> Pins {
+    let path = find_manifest("organ2d").unwrap().with_file_name("organ2d.pins.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn model() -> Model {
+    Model::open(&Runtime::load(None).unwrap(), &find_manifest("organ2d").unwrap(), NonZeroUsize::MIN).unwrap()
+}
+
+#[test]
+fn outputs_are_those_that_python_pinned() {
+    let (pins, mut model) = (pins(), model());
+    let outputs = model.run(image(&pins).view()).unwrap();
+    let names: Vec<_> = model.manifest().outputs.iter().map(|port| port.name.as_str()).collect();
+    let mut largest = 0f32;
+    for Pin { output, at: [c, y, x], value } in &pins.pins {
+        let which = names.iter().position(|name| name == output).unwrap();
+        let found = outputs[which][[0, *c, *y, *x]];
+        let difference = (found - value).abs();
+        assert!(difference <= TOLERANCE, "{output} {c},{y},{x}: found {found}, pinned {value}");
+        largest = largest.max(difference);
+    }
+    assert!(pins.pins.len() >= 50, "{} pins", pins.pins.len());
+    eprintln!("largest difference of {} pins: {largest:e}", pins.pins.len());
+}
+
+#[test]
+fn pins_notice_another_image() {
+    // The negative control: with one channel darker, most pins must fail.
+    let pins = pins();
+    let mut image = image(&pins);
+    image.slice_mut(s![0, 1, .., ..]).mapv_inplace(|value| value * 0.9);
+    let mut model = model();
+    let outputs = model.run(image.view()).unwrap();
+    let names: Vec<_> = model.manifest().outputs.iter().map(|port| port.name.clone()).collect();
+    let moved = pins.pins.iter().filter(|Pin { output, at: [c, y, x], value }| {
+        let which = names.iter().position(|name| name == output).unwrap();
+        (outputs[which][[0, *c, *y, *x]] - value).abs() > TOLERANCE
+    });
+    assert!(moved.count() * 2 > pins.pins.len());
+}
+
+#[test]
+fn two_sessions_agree_to_the_last_bit() {
+    let picture = Rgb::from_fn(640, 480, |x, y| image::Rgb([(x / 3) as u8, (y / 2) as u8, ((x * y) / 700) as u8]));
+    let run = || {
+        let runtime = Runtime::load(None).unwrap();
+        Organ2d::open(&runtime, &find_manifest("organ2d").unwrap(), NonZeroUsize::MIN).unwrap().run(&picture).unwrap()
+    };
+    let maps = run();
+    assert_eq!(maps, run());
+    assert_eq!(maps.dist.dimensions(), (384, 288));
+    assert!(maps.dist.pixels().all(|pixel| (0.0..=1.0).contains(&pixel.0[0])));
+}
