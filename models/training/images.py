@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFilter
 
-SIDE = 192
+SIDE = 256
 IGNORED = 255
 HELD_OUT = 0.03
 LOG_NEAR, LOG_FAR = np.log(0.05), np.log(50.0)
@@ -156,7 +156,7 @@ def other_background(random, rgb, organ):
 
 
 def with_things(random, rgb):
-    """Pots, stakes, cables, stones: a few plain shapes that are no plant."""
+    """Pots, stakes, cables, stones, dark frames of photos: a few plain shapes that are no plant."""
     image = Image.fromarray((np.clip(rgb, 0, 1) * 255).astype(np.uint8))
     draw = ImageDraw.Draw(image)
     for _ in range(random.integers(1, 6)):
@@ -164,11 +164,14 @@ def with_things(random, rgb):
         grey = random.uniform(0, 255) * np.ones(3)
         colour = tuple(int(value) for value in np.clip(random.normal(grey, 25), 0, 255))
         box = [min(x, other_x), min(y, other_y), max(x, other_x), max(y, other_y)]
-        kind = random.integers(3)
+        kind = random.integers(4)
         if kind == 0:
             draw.rectangle(box, fill=colour)
         elif kind == 1:
             draw.ellipse(box, fill=colour)
+        elif kind == 2:
+            near, far = sorted(int(edge) for edge in random.choice([0, SIDE]) + random.integers(-12, 12, 2))
+            draw.rectangle([near, 0, far, SIDE] if random.random() < 0.7 else [0, near, SIDE, far], fill=colour)
         else:
             draw.line([x, y, other_x, other_y], fill=colour, width=int(random.integers(1, 12)))
     return np.asarray(image, np.float32) / 255
