@@ -145,7 +145,7 @@ impl Eye {
         let (raster, regions) = view::instances(&view);
         let lifted = view::lift(&view, &raster, &regions, scale);
         let (plants, refused) = view::group(&view, &lifted.organs);
-        let sights = plants.into_iter().map(|plant| PlantSight {
+        let sights = plants.into_iter().map(|plant| plant.anchored(&view)).map(|plant| PlantSight {
             ground: plant.ground_position(&view),
             off_centre: plant.off_centre(&view),
             bounds: enlarged(plant.bounds, maps.scale, picture.dimensions()),

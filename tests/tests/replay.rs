@@ -34,8 +34,7 @@ fn the_bundled_session_becomes_its_plants_and_two_replays_agree_to_the_byte() {
     assert_eq!(replay(&fixture(), &second).0, Some(0));
     let plants = stored(&first);
     assert_eq!(plants, stored(&second), "no clock, thread or hash map may reach a record");
-    let printed: Vec<&str> =
-        replayed["plants"].as_array().unwrap().iter().map(|p| p["id"].as_str().unwrap()).collect();
+    let printed: Vec<&str> = replayed["plants"].as_array().unwrap().iter().map(|p| p["id"].as_str().unwrap()).collect();
     assert_eq!(printed, plants.iter().map(|p| p.0.as_str()).collect::<Vec<_>>());
     // Each plant waits to be synced, exactly once.
     let outbox: i64 =

@@ -9,6 +9,7 @@
 //! Numbers of pixels are stated for a 640 x 480 picture and scale with its area (see [`View::pixels`]), lengths in
 //! pixels with its diagonal.
 
+mod anchor;
 mod gap;
 mod group;
 mod instances2d;

@@ -1,5 +1,7 @@
 //! On scenes drawn here by hand, with known distances; tests/view.rs uses the renderer's plants.
 
+use std::collections::BTreeSet;
+
 use demeter_frame::{Instances, Pose, Semantic};
 use glam::{DVec2, DVec3};
 use image::{ImageBuffer, Luma};
@@ -258,7 +260,8 @@ proptest! {
         }
     }
 
-    /// Every observation ends in exactly one track, the best view is the best, and the order within frames is nothing.
+    /// Every observation ends in one track, pieces of one plant in one frame count once, the best view is the best,
+    /// and the order within frames is nothing.
     #[test]
     fn tracking_loses_nothing_and_ignores_the_order(
         frames in prop::collection::vec(prop::collection::vec((0.0..3.0f64, 0..1000usize, any::<bool>()), 0..6), 1..20),
@@ -287,7 +290,14 @@ proptest! {
         let closed = run(false);
         prop_assert_eq!(&closed, &run(true));
         let observed: usize = frames.iter().map(Vec::len).sum();
-        prop_assert_eq!(closed.iter().map(|c| c.frames.len()).sum::<usize>(), observed);
+        prop_assert!(closed.iter().map(|c| c.frames.len()).sum::<usize>() <= observed);
+        let told: BTreeSet<usize> = closed.iter().flat_map(|c| c.frames.iter().copied()).collect();
+        let seen: BTreeSet<usize> = (0..frames.len()).filter(|f| !frames[*f].is_empty()).collect();
+        prop_assert_eq!(told, seen, "every frame that showed something is told of");
+        let pixels = |c: &Closed<usize, (usize, usize, bool)>| c.best.1;
+        let largest = frames.iter().flatten().filter(|o| o.2).map(|o| o.1).max();
+        let kept = closed.iter().filter(|c| c.best.2).map(pixels).max();
+        prop_assert_eq!(kept, largest, "the best of all whole views is kept");
         prop_assert!(closed.iter().enumerate().all(|(i, c)| c.number == i as u64 + 1));
         for track in &closed {
             prop_assert!(track.frames.contains(&track.best_frame));
@@ -327,4 +337,18 @@ fn an_observation_without_a_place_is_given_back() {
     let nowhere = Observation { position: DVec2::NAN, quality, view: () };
     assert_eq!(tracker.frame(&0, 0.0, vec![nowhere]).1.len(), 1);
     assert!(tracker.finish().is_empty());
+}
+
+#[test]
+fn pieces_of_one_plant_in_one_frame_are_one_sight_of_the_largest() {
+    let mut tracker = Tracker::new(Gate(0.1));
+    let piece = |x: f64, pixels: usize| Observation {
+        position: DVec2::new(x, 0.0),
+        quality: Quality { whole: true, pixels, off_centre: 0.0 },
+        view: pixels,
+    };
+    tracker.frame(&0, 0.0, vec![piece(0.05, 10), piece(0.0, 90), piece(0.5, 40)]);
+    let closed = tracker.finish();
+    let told: Vec<(f64, usize, usize)> = closed.iter().map(|c| (c.position.x, c.best, c.frames.len())).collect();
+    assert_eq!(told, [(0.005, 90, 1), (0.5, 40, 1)], "two plants; the piece moves its plant by its share of pixels");
 }

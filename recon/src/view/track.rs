@@ -59,7 +59,7 @@ pub struct Observation<T> {
 pub struct Closed<F, T> {
     /// Its number in the session, 1 and up: in the order of closing, and of opening where several close at once.
     pub number: u64,
-    /// Mean of the observed positions, metres.
+    /// Mean of the observed positions, each as heavy as it has pixels, metres.
     pub position: DVec2,
     /// The frames it was seen in, in order.
     pub frames: Vec<F>,
@@ -71,15 +71,39 @@ pub struct Closed<F, T> {
 
 #[derive(Clone, Debug)]
 struct Track<F, T> {
+    /// Sum of positions, each as heavy as it has pixels, and of those weights.
     sum: DVec2,
+    weight: f64,
     frames: Vec<F>,
     last_seen: f64,
     best: (Quality, F, T),
 }
 
-impl<F, T> Track<F, T> {
+impl<F: Clone + PartialEq, T> Track<F, T> {
+    fn open(frame: &F, travelled: f64, observation: Observation<T>) -> Self {
+        let Observation { position, quality, view } = observation;
+        let weight = quality.pixels.max(1) as f64;
+        let frames = vec![frame.clone()];
+        Self { sum: position * weight, weight, frames, last_seen: travelled, best: (quality, frame.clone(), view) }
+    }
+
+    fn add(&mut self, frame: &F, travelled: f64, observation: Observation<T>) {
+        let Observation { position, quality, view } = observation;
+        let weight = quality.pixels.max(1) as f64;
+        self.sum += position * weight;
+        self.weight += weight;
+        self.last_seen = travelled;
+        // Two pieces of one plant in one picture are one sight of it.
+        if self.frames.last() != Some(frame) {
+            self.frames.push(frame.clone());
+        }
+        if quality.beats(&self.best.0) {
+            self.best = (quality, frame.clone(), view);
+        }
+    }
+
     fn position(&self) -> DVec2 {
-        self.sum / self.frames.len() as f64
+        self.sum / self.weight
     }
 }
 
@@ -94,7 +118,7 @@ pub struct Tracker<F, T> {
     closed: u64,
 }
 
-impl<F: Clone, T> Tracker<F, T> {
+impl<F: Clone + PartialEq, T> Tracker<F, T> {
     /// A tracker that has seen nothing.
     #[must_use]
     pub fn new(gate: Gate) -> Self {
@@ -110,26 +134,18 @@ impl<F: Clone, T> Tracker<F, T> {
         observations: Vec<Observation<T>>,
     ) -> (Vec<Closed<F, T>>, Vec<Observation<T>>) {
         let (mut seen, lost): (Vec<_>, Vec<_>) = observations.into_iter().partition(|o| o.position.is_finite());
-        seen.sort_by(|a, b| a.position.x.total_cmp(&b.position.x).then(a.position.y.total_cmp(&b.position.y)));
-        let matches = self.matches(&seen);
-        for (observation, matched) in seen.into_iter().zip(matches) {
-            let Observation { position, quality, view } = observation;
-            match matched {
-                Some(track) => {
-                    let track = &mut self.open[track];
-                    track.sum += position;
-                    track.frames.push(frame.clone());
-                    track.last_seen = travelled;
-                    if quality.beats(&track.best.0) {
-                        track.best = (quality, frame.clone(), view);
-                    }
-                }
-                None => self.open.push(Track {
-                    sum: position,
-                    frames: vec![frame.clone()],
-                    last_seen: travelled,
-                    best: (quality, frame.clone(), view),
-                }),
+        // The largest first: two plants never stand within the gate, so what lies there is a piece of the larger.
+        let place = |o: &Observation<T>| (o.position.x, o.position.y);
+        seen.sort_by(|a, b| {
+            let ((ax, ay), (bx, by)) = (place(a), place(b));
+            b.quality.pixels.cmp(&a.quality.pixels).then(ax.total_cmp(&bx)).then(ay.total_cmp(&by))
+        });
+        for observation in seen {
+            let distance = |track: &Track<F, T>| track.position().distance(observation.position);
+            let near = (0..self.open.len()).filter(|&t| distance(&self.open[t]) <= self.gate.0);
+            match near.min_by(|&a, &b| distance(&self.open[a]).total_cmp(&distance(&self.open[b]))) {
+                Some(track) => self.open[track].add(frame, travelled, observation),
+                None => self.open.push(Track::open(frame, travelled, observation)),
             }
         }
         // The tracks unseen for longest make room, and those that were passed go in any case.
@@ -150,29 +166,6 @@ impl<F: Clone, T> Tracker<F, T> {
     pub fn finish(mut self) -> Vec<Closed<F, T>> {
         let rest = std::mem::take(&mut self.open);
         self.close(rest)
-    }
-
-    /// One track for each observation at most, and the other way round: nearest pairs first.
-    fn matches(&self, seen: &[Observation<T>]) -> Vec<Option<usize>> {
-        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
-        for (t, track) in self.open.iter().enumerate() {
-            for (o, observation) in seen.iter().enumerate() {
-                let distance = track.position().distance(observation.position);
-                if distance <= self.gate.0 {
-                    pairs.push((distance, t, o));
-                }
-            }
-        }
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        let mut matched = vec![None; seen.len()];
-        let mut taken = vec![false; self.open.len()];
-        for (_, t, o) in pairs {
-            if !taken[t] && matched[o].is_none() {
-                taken[t] = true;
-                matched[o] = Some(t);
-            }
-        }
-        matched
     }
 
     fn close(&mut self, tracks: Vec<Track<F, T>>) -> Vec<Closed<F, T>> {
