@@ -4,6 +4,7 @@ use rand::Rng;
 use super::Seeded;
 use super::sprout::normal;
 use crate::cloud::PointCloud;
+use crate::metrics::sample_surface;
 use crate::model::{Detail, Knots, OrganKind, Plant, PlantError, PlantMesh, Species, forward};
 
 /// Points on a plant with their truth.
@@ -40,22 +41,9 @@ pub fn labelled_cloud(
             }
         })
         .collect();
-    let mut total = 0.0;
-    let reach: Vec<f64> = (0..mesh.faces.len())
-        .map(|face| {
-            total += mesh.face_area(face);
-            total
-        })
-        .collect();
     let (mut points, mut labels, mut organs) = (Vec::new(), Vec::new(), Vec::new());
-    for _ in 0..count {
-        let at = rng.random::<f64>() * total;
-        let face = reach.partition_point(|r| *r < at).min(reach.len() - 1);
-        let [a, b, c] = mesh.corners(face);
-        // The root makes points uniform over the triangle.
-        let (root, t) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
-        let shake = DVec3::new(normal(rng), normal(rng), normal(rng)) * noise;
-        points.push(a * (1.0 - root) + b * (root * (1.0 - t)) + c * (root * t) + shake);
+    for (point, face) in sample_surface(&mesh, count, rng.random()) {
+        points.push(point + DVec3::new(normal(rng), normal(rng), normal(rng)) * noise);
         let organ = mesh.organ_of_face[face];
         labels.push(label_of[organ as usize]);
         organs.push(organ);

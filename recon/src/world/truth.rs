@@ -2,6 +2,7 @@ use glam::{DQuat, DVec3};
 use serde::Serialize;
 
 use super::scene::{Scene, Standing};
+use crate::export::kind_name;
 use crate::model::{Detail, Form, Knots, OrganKind, PlantError, PlantMesh, Species, forward};
 
 /// What is true of a synthetic plant.
@@ -75,7 +76,7 @@ fn of(standing: &Standing, species: &Species) -> Result<PlantTruth, PlantError> 
         };
         leaves.extend(leaf);
         organs.push(OrganTruth {
-            kind: ["main_stem", "stem", "leaf"][organ.kind() as usize],
+            kind: kind_name(organ.kind()),
             parent: organ.parent,
             d: organ.joint.d,
             rotation: organ.joint.rotation,
