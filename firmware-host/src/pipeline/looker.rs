@@ -113,6 +113,7 @@ fn observations(
         let whole = !seen.plant.touches_border;
         Observation {
             position: seen.ground,
+            camera: world_from_camera.translation.truncate(),
             quality: Quality { whole, pixels: seen.plant.pixels, off_centre: seen.off_centre },
             view: BestView {
                 organs: seen.plant.organs,

@@ -8,7 +8,11 @@ const PASSED_M: f64 = 0.5;
 /// Most tracks open at once; the one unseen for longest is closed for a new one. A picture holds far fewer plants.
 const MAX_OPEN: usize = 256;
 
-/// How far from a track's position an observation may lie, metres.
+/// How much less a distance along the line of sight counts than one across it: a plant's direction is seen to a pixel,
+/// its depth is a network's word (a guess).
+const DEPTH_DOUBT: f64 = 3.0;
+
+/// How far from a track's position an observation may lie across the line of sight, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate(pub f64);
 
@@ -48,10 +52,22 @@ impl Quality {
 pub struct Observation<T> {
     /// Where it stands on the ground, metres.
     pub position: DVec2,
+    /// Where the camera stood, metres.
+    pub camera: DVec2,
     /// How well it is seen.
     pub quality: Quality,
     /// What is kept of the best view.
     pub view: T,
+}
+
+impl<T> Observation<T> {
+    /// Distance to a place on the ground, metres across the line of sight.
+    fn distance(&self, place: DVec2) -> f64 {
+        let sight = (self.position - self.camera).normalize_or_zero();
+        let away = place - self.position;
+        let along = away.dot(sight);
+        DVec2::new((away - sight * along).length(), along / DEPTH_DOUBT).length()
+    }
 }
 
 /// A plant that the rig has passed; `F` names a frame, `T` is what is kept of a view.
@@ -81,14 +97,14 @@ struct Track<F, T> {
 
 impl<F: Clone + PartialEq, T> Track<F, T> {
     fn open(frame: &F, travelled: f64, observation: Observation<T>) -> Self {
-        let Observation { position, quality, view } = observation;
+        let Observation { position, quality, view, .. } = observation;
         let weight = quality.pixels.max(1) as f64;
         let frames = vec![frame.clone()];
         Self { sum: position * weight, weight, frames, last_seen: travelled, best: (quality, frame.clone(), view) }
     }
 
     fn add(&mut self, frame: &F, travelled: f64, observation: Observation<T>) {
-        let Observation { position, quality, view } = observation;
+        let Observation { position, quality, view, .. } = observation;
         let weight = quality.pixels.max(1) as f64;
         self.sum += position * weight;
         self.weight += weight;
@@ -141,7 +157,7 @@ impl<F: Clone + PartialEq, T> Tracker<F, T> {
             b.quality.pixels.cmp(&a.quality.pixels).then(ax.total_cmp(&bx)).then(ay.total_cmp(&by))
         });
         for observation in seen {
-            let distance = |track: &Track<F, T>| track.position().distance(observation.position);
+            let distance = |track: &Track<F, T>| observation.distance(track.position());
             let near = (0..self.open.len()).filter(|&t| distance(&self.open[t]) <= self.gate.0);
             match near.min_by(|&a, &b| distance(&self.open[a]).total_cmp(&distance(&self.open[b]))) {
                 Some(track) => self.open[track].add(frame, travelled, observation),
