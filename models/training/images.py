@@ -118,7 +118,8 @@ def cropped(random, rgb, sem, dist, log_depth, known):
     rgb = np.asarray(Image.fromarray(rgb[y : y + side, x : x + side]).resize((SIDE, SIDE), Image.BILINEAR))
     pick = np.clip(((np.arange(SIDE) + 0.5) * side / SIDE).astype(int), 0, side - 1)
     sem, dist, log_depth, known = (array[np.ix_(y + pick, x + pick)] for array in (sem, dist, log_depth, known))
-    # The label is d0 / max(d, d0) with a fixed d0 in pixels, and distances grow with the scale.
+    # The label is d0 / max(d, d0) with a fixed d0 in pixels (1 % of the diagonal), and distances grow with the scale.
+    # Where it is 1, d is unknown: it stays 1.
     dist = np.where(dist >= 1, 1, np.minimum(1, dist / scale))
     return rgb, sem, dist, log_depth, known
 
