@@ -73,7 +73,7 @@ pub fn species(name: &str) -> Result<Species, CommandError> {
     }
 }
 
-fn file_error(path: &Path, error: &std::io::Error) -> CommandError {
+pub(crate) fn file_error(path: &Path, error: &std::io::Error) -> CommandError {
     let message = format!("{}: {error}", path.display());
     CommandError { exit: Exit::Failed, kind: "file", message, expected: None, found: None }
 }

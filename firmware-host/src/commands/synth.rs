@@ -1,15 +1,13 @@
 //! `demeter synth`: the synthetic world in files.
 
-use std::path::Path;
-
 use clap::Subcommand;
-use demeter_recon::model::Species;
 
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
 mod clouds;
 mod images;
+mod plant;
 mod session;
 
 /// Arguments of `demeter synth`.
@@ -21,6 +19,8 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum What {
+    /// One plant: its exact record, mesh and picture.
+    Plant(plant::Args),
     /// A recorded session of a row, with its truth.
     Session(session::Args),
     /// Labelled point clouds of single plants.
@@ -35,25 +35,11 @@ enum What {
 /// [`CommandError`] when the world refuses the plan or a file cannot be written.
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     match &args.what {
+        What::Plant(args) => plant::run(args, output),
         What::Session(args) => session::run(args, output),
         What::Clouds(args) => clouds::run(args, output),
         What::Images(args) => images::run(args, output),
     }
-}
-
-fn species(name: &str) -> Result<Species, CommandError> {
-    let known = demeter_recon::species::NAMES.join(", ");
-    demeter_recon::species::shipped(name)
-        .ok_or_else(|| CommandError::usage("species", format!("no species `{name}`")).with(known, name))?
-        .map_err(|error| CommandError::failed("species", &error))
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
-    std::fs::write(path, bytes).map_err(|error| file_error(path, &error))
-}
-
-fn file_error(path: &Path, error: &std::io::Error) -> CommandError {
-    CommandError::failed("file", &std::io::Error::new(error.kind(), format!("{}: {error}", path.display())))
 }
 
 fn unit_interval(text: &str) -> Result<f64, String> {

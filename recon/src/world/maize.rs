@@ -24,7 +24,7 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
     let longest = (0.30 + 0.60 * age.powf(0.8)) * (0.15 * normal(rng)).exp();
     let plane = rng.random_range(0.0..2.0 * PI);
     let drift = 0.05 * normal(rng);
-    let width = (0.85 + 0.15 * normal(rng)).max(0.5);
+    let width = (0.95 + 0.22 * normal(rng)).max(0.5);
     // Whole plants are erect or lax by genotype.
     let lax = normal(rng);
     for i in 0..leaves {
@@ -36,7 +36,7 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
         let length = longest * profile * (0.08 * normal(rng)).exp();
         // Leaf angles from the stalk: 15 degrees in the whorl to 50 below (guess within the published 10 to 60).
         let tilt = (0.85 - 0.6 * up + 0.08 * lax + 0.1 * normal(rng)).clamp(0.08, 1.3);
-        let mut gamma = coefficients(rng, species.leaf.deform.rank(), 0.8);
+        let mut gamma = coefficients(rng, species.leaf.deform.rank(), 1.0);
         // Long unfolded blades arch over by a right angle or more, the whorl's stand; γ_0 is the total turn.
         gamma[0] = (2.5 - 2.0 * up + 0.5 * lax + 0.5 * gamma[0]).clamp(-0.3, 3.0);
         let blade = Blade {

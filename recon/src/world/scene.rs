@@ -90,6 +90,21 @@ pub struct Setting {
     pub light: Light,
 }
 
+impl Setting {
+    /// A plain light room with a lamp from above and in front: for pictures of single plants.
+    pub const STUDIO: Self = Self {
+        ground: Ground { z: 0.0, surface: Surface::Plain { colour: Vec3::splat(0.6) } },
+        backdrop: Backdrop::Sky { brightness: 0.8 },
+        pot: None,
+        light: Light {
+            // The unit vector along (0.3, -0.5, 0.8).
+            to_sun: Vec3::new(0.303_046, -0.505_076, 0.808_122),
+            sun: Vec3::splat(1.2),
+            ambient: Vec3::splat(0.6),
+        },
+    };
+}
+
 /// A plant of a scene.
 #[derive(Clone, Debug)]
 pub struct Standing {

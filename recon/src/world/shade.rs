@@ -114,6 +114,8 @@ fn leaf_colour(colour: Vec3, look: &Look, uv: Vec2) -> Vec3 {
     if look.yellow > 0.0 {
         let patch = noise(uv * Vec2::new(4.0, 6.0), look.seed ^ 9) * 0.7 + 0.5 * uv.y;
         colour = colour.lerp(Vec3::new(0.42, 0.36, 0.08), (look.yellow * 2.0 * patch).min(1.0));
+        // What is quite yellow dries to brown.
+        colour = colour.lerp(Vec3::new(0.3, 0.21, 0.11), (look.yellow * 4.0 * patch - 1.6).clamp(0.0, 1.0));
     }
     colour
 }

@@ -79,7 +79,8 @@ fn potted(species: &Species, size: u32, rng: &mut Seeded) -> Result<(Scene, Pinh
     let light = Light {
         to_sun: direction(rng.random_range(0.0..TAU), rng.random_range(0.2..1.4)),
         sun: Vec3::new(1.0, 0.97, 0.9) * lamp,
-        ambient: Vec3::splat(rng.random_range(0.12..0.7)),
+        // Lamps behind the wall leave the plant dark, lamps in front do not.
+        ambient: Vec3::splat(rng.random_range(0.1f32..0.9)),
     };
     let scene = lab(species, plant, &Lab { wall, floor, pot, light }, rng.random())?;
     let azimuth = -0.5 * PI + rng.random_range(-0.1..0.1);

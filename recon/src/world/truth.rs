@@ -3,7 +3,9 @@ use serde::Serialize;
 
 use super::scene::{Scene, Standing};
 use crate::export::kind_name;
-use crate::model::{Detail, Form, Knots, OrganKind, PlantError, PlantMesh, Species, forward};
+use crate::model::{Form, PlantError, Species, forward};
+use crate::organs::ScaleSource;
+use crate::traits::{PlantTraits, keys};
 
 /// What is true of a synthetic plant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -64,18 +66,14 @@ pub fn truth<'a>(scene: &Scene, species: impl Fn(&str) -> Option<&'a Species>) -
 fn of(standing: &Standing, species: &Species) -> Result<PlantTruth, PlantError> {
     let plant = &standing.plant;
     let posed = forward(plant, species)?;
-    let mesh = PlantMesh::of(&posed, Detail::Control, Knots::Uniform);
-    let base = plant.world_from_plant.translation;
-    let leaf = |organ: usize| plant.organs[organ].kind() == OrganKind::Leaf;
-    let mut leaves: Vec<u16> = Vec::new();
-    let mut organs = Vec::with_capacity(plant.organs.len());
-    for (organ, at) in plant.organs.iter().zip(&posed.world_from_organ) {
+    let traits = PlantTraits::of(plant, species, ScaleSource::Input)?.plant;
+    let value = |key: &str| traits.get(key).map_or(0.0, |quantity| quantity.value);
+    let organs = plant.organs.iter().zip(&posed.world_from_organ).map(|(organ, at)| {
         let (beta, gamma, size, leaf) = match &organ.form {
             Form::Stem { gamma, radius } => (Vec::new(), gamma, *radius, None),
             Form::Leaf { blade, leaf } => (blade.beta.clone(), &blade.gamma, blade.width, Some(*leaf)),
         };
-        leaves.extend(leaf);
-        organs.push(OrganTruth {
+        OrganTruth {
             kind: kind_name(organ.kind()),
             parent: organ.parent,
             d: organ.joint.d,
@@ -86,22 +84,16 @@ fn of(standing: &Standing, species: &Species) -> Result<PlantTruth, PlantError> 
             gamma: gamma.clone(),
             size,
             leaf,
-        });
-    }
-    let blade_count = leaves.len();
-    leaves.sort_unstable();
-    leaves.dedup();
+        }
+    });
     Ok(PlantTruth {
         species: standing.species.clone(),
-        position: base,
+        position: plant.world_from_plant.translation,
         rotation: plant.world_from_plant.rotation,
-        height: mesh.positions.iter().map(|p| p.z - base.z).fold(0.0, f64::max),
-        leaf_count: leaves.len(),
-        blade_count,
-        leaf_area: (0..mesh.faces.len())
-            .filter(|face| leaf(mesh.organ_of_face[*face] as usize))
-            .map(|face| mesh.face_area(face))
-            .sum(),
-        organs,
+        height: value(keys::HEIGHT),
+        leaf_count: value(keys::LEAF_COUNT) as usize,
+        blade_count: value(keys::BLADE_COUNT) as usize,
+        leaf_area: value(keys::LEAF_AREA),
+        organs: organs.collect(),
     })
 }

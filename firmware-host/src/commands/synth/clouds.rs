@@ -3,8 +3,9 @@ use std::path::PathBuf;
 use demeter_recon::export::{PointOrgan, cloud_to_ply};
 use demeter_recon::world::{grow, labelled_cloud, seeded};
 
-use super::{species, unit_interval};
+use super::unit_interval;
 use crate::error::{CommandError, Exit};
+use crate::files;
 use crate::output::Output;
 
 /// Arguments of `demeter synth clouds`.
@@ -34,8 +35,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    let species = species(&args.species)?;
-    std::fs::create_dir_all(&args.output).map_err(|error| super::file_error(&args.output, &error))?;
+    let species = files::species(&args.species)?;
+    std::fs::create_dir_all(&args.output).map_err(|error| files::file_error(&args.output, &error))?;
     for i in 0..args.count {
         let mut rng = seeded(args.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(u64::from(i)));
         let age = args.age * (f64::from(i) + 1.0) / f64::from(args.count);
@@ -44,7 +45,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
             .map_err(|error| CommandError::failed("world", &error))?;
         let organ = |organ: &u32| PointOrgan { organ: *organ as i32, kind: plant.organs[*organ as usize].kind() };
         let organs: Vec<PointOrgan> = made.organ.iter().map(organ).collect();
-        super::write(&args.output.join(format!("{i:04}.ply")), &cloud_to_ply(&made.cloud, Some(&organs)))?;
+        files::write(&args.output.join(format!("{i:04}.ply")), &cloud_to_ply(&made.cloud, Some(&organs)))?;
     }
     if output.json {
         output.json(&serde_json::json!({"clouds": args.count}))?;

@@ -6,8 +6,8 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use demeter_recon::world::{View, boundary_distance, training_view};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::species;
 use crate::error::{CommandError, Exit};
+use crate::files;
 use crate::output::Output;
 
 /// Arguments of `demeter synth images`.
@@ -42,7 +42,7 @@ struct Sheet {
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    let (soybean, maize) = (species("soybean")?, species("maize")?);
+    let (soybean, maize) = (files::species("soybean")?, files::species("maize")?);
     let failed = |error: std::io::Error| {
         CommandError::failed("output", &std::io::Error::other(format!("{}: {error}", args.output.display())))
     };

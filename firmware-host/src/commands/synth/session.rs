@@ -6,8 +6,9 @@ use demeter_recon::world::{PlantTruth, Row, truth};
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::{species, unit_interval};
+use super::unit_interval;
 use crate::error::{CommandError, Exit};
+use crate::files;
 use crate::output::Output;
 use crate::synthetic::Synthetic;
 
@@ -52,7 +53,7 @@ struct Truth {
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    let species = species(&args.species)?;
+    let species = files::species(&args.species)?;
     let (width, height) = (args.width, args.width * 3 / 4);
     let intrinsics = Intrinsics::from_hfov(width, height, args.hfov.to_radians());
     let plan = Row { plants: args.plants.into(), spacing: args.spacing, age: args.age, frames: args.frames.into() };
@@ -94,7 +95,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
 
 fn write_truth(folder: &Path, truth: &Truth) -> Result<(), CommandError> {
     let text = serde_json::to_string_pretty(truth).map_err(|error| CommandError::failed("output", &error))?;
-    super::write(&folder.join("truth.json"), text.as_bytes())
+    files::write(&folder.join("truth.json"), text.as_bytes())
 }
 
 fn spacing(text: &str) -> Result<f64, String> {
