@@ -14,6 +14,8 @@ use crate::nearest::{Nearest, Neighbour};
 const SLICES: usize = 14;
 /// Most points of one blade that steer the fit; more only slow it down.
 const MAX_POINTS: usize = 2_000;
+/// Points that bring it near.
+const FEW_POINTS: usize = 400;
 /// Control points that look for data: every second row and third column.
 const LOOKOUT: (usize, usize) = (2, 3);
 /// Standard deviation of a scan about the model, as a share of the blade's length (a guess from real scans).
@@ -63,19 +65,32 @@ struct Data<'a> {
 
 /// Fits a blade whose base is attached at `base`; `up` tells the upper side where the cloud cannot.
 pub(super) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -> LeafFit {
-    let stride = points.len().div_ceil(MAX_POINTS).max(1);
-    let points: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
-    let tree = Nearest::of(&points);
-    let gaps: Vec<f64> =
-        points.iter().step_by(7).filter_map(|p| tree.k(*p, 8).last().map(Neighbour::distance)).collect();
-    let spacing = median(gaps).unwrap_or(0.0).max(1e-6);
-    let data = Data { base, points, tree, spacing, species };
-    let mut state = data.first_guess(up);
-    let converged = minimise(&mut state, 25, |s| data.normal(s), |s, step| data.apply(s, step));
-    data.finish(state, converged)
+    let coarse = Data::new(points, base, species, FEW_POINTS);
+    let fine = Data::new(points, base, species, MAX_POINTS);
+    // Along the course of its points, and straight: where blades fold, one of the two is nearer to the truth.
+    let guess = coarse.first_guess(up);
+    let straight = State { gamma: vec![0.0; guess.gamma.len()], ..guess.clone() };
+    let starts = [guess, straight].map(|mut state| {
+        minimise(&mut state, 15, |s| coarse.normal(s), |s, step| coarse.apply(s, step));
+        (coarse.normal(&state).cost, state)
+    });
+    let [first, second] = starts;
+    let mut state = if second.0 < first.0 { second.1 } else { first.1 };
+    let converged = minimise(&mut state, 12, |s| fine.normal(s), |s, step| fine.apply(s, step));
+    fine.finish(state, converged)
 }
 
-impl Data<'_> {
+impl<'a> Data<'a> {
+    /// At most about `most` of the points, evenly.
+    fn new(points: &[DVec3], base: DVec3, species: &'a Species, most: usize) -> Self {
+        let stride = points.len().div_ceil(most).max(1);
+        let points: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
+        let tree = Nearest::of(&points);
+        let apart = |p: &DVec3| tree.k(*p, 8).last().map(Neighbour::distance);
+        let spacing = median(points.iter().step_by(7).filter_map(apart).collect()).unwrap_or(0.0).max(1e-6);
+        Self { base, points, tree, spacing, species }
+    }
+
     fn first_guess(&self, up: DVec3) -> State {
         let path = resample(&course(&self.points, self.base, SLICES), ROWS);
         let metres = self.species.ranges.blade_length.clamp(length(&path));
