@@ -9,10 +9,15 @@ use super::View;
 use super::lift::MAX_SLOPE;
 use crate::model::OrganKind;
 
-/// Pixels at or over this truncated inverse distance lie at the border of two organs and found no instance. It
-/// saturates at 1 within δ = 1 % of the diagonal, and organs are seldom wider than a few δ: the threshold is near 1
-/// (ours to tune, reconstruction.md "Points to organs").
-const BOUNDARY: f32 = 0.9;
+/// Truncated inverse distances below which seeds are looked for, one after the other: what is far from every other
+/// organ first, then the thin and the crowded. t saturates at 1 within δ = 1 % of the picture's diagonal, so 0.6 is 1.7 δ
+/// and the last is everything (ours to tune, reconstruction.md "Points to organs").
+const LEVELS: [f32; 3] = [0.6, 0.9, f32::INFINITY];
+/// A patch of main stem with less than this share of the largest one's pixels is the tip of a leaf that hangs like a
+/// stem, and counts as leaf (a guess; plants in one picture are of a size, and a plant without a stem gets one later).
+const MIN_STEM_SHARE: f64 = 0.2;
+/// Depth jumps from one organ to the next are told from the network's blur by this many times its median step.
+const BLUR_STEPS: f32 = 4.0;
 /// The smallest seed at 640 x 480, pixels: smaller ones are specks (a guess).
 const MIN_SEED: f64 = 10.0;
 /// Most instances in one picture; the smallest go first. A bound for later stages, far above any plant row in view.
@@ -35,37 +40,33 @@ pub struct Region {
 
 /// Divides the organ pixels of a view into instances.
 ///
-/// Seeds are connected pixels of one class far from other organs; the other pixels of the class go to the seed that is
-/// nearest inside the class. Patches that no seed reaches (thin organs, boundary all over) are instances of their own.
+/// Level by level, seeds grow into the pixels of their class that they reach, and connected pixels that no seed reaches
+/// become seeds themselves: a watershed of the boundary distance inside each class.
 #[must_use]
 pub fn instances(view: &View<'_>) -> (Instances, Vec<Region>) {
-    let grid = Grid {
-        width: view.intrinsics.width as usize,
-        height: view.intrinsics.height as usize,
-        log_depth: view.log_depth.as_raw(),
-        jump: (MAX_SLOPE / view.intrinsics.fx.min(view.intrinsics.fy)) as f32,
-    };
-    let class: Vec<u8> = view.semantic.as_raw().iter().map(|&c| if kind(c).is_some() { c } else { 0 }).collect();
-    let dist = view.dist.as_raw();
-    // Main stems do not cross, but leaves all along would cut them: they need no boundary.
-    let is_core = |c: u8, t: f32| c == Semantic::MainStem as u8 || t < BOUNDARY;
-    let core: Vec<u8> = class.iter().zip(dist).map(|(&c, &t)| if is_core(c, t) { c } else { 0 }).collect();
+    let mut class: Vec<u8> = view.semantic.as_raw().iter().map(|&c| if kind(c).is_some() { c } else { 0 }).collect();
+    let grid = Grid::of(view, &class);
     let min_seed = view.pixels(MIN_SEED);
+    grid.hanging_tips_to_leaf(&mut class);
 
-    let (mut label, seeds) = grid.components(&core, min_seed, 0);
-    grid.grow(&class, &mut label);
-    let rest: Vec<u8> = class.iter().zip(&label).map(|(&c, &l)| if l == 0 { c } else { 0 }).collect();
-    let (others, count) = grid.components(&rest, min_seed, seeds);
-    for (l, other) in label.iter_mut().zip(others) {
-        *l = (*l).max(other);
+    let (mut label, mut last) = (vec![0; class.len()], 0);
+    for level in LEVELS {
+        // Main stems do not cross, but leaves all along would cut them: they need no boundary.
+        let is_core = |c: u8, t: f32| c == MAIN || t < level || level == f32::INFINITY;
+        let core: Vec<u8> =
+            class.iter().zip(view.dist.as_raw()).map(|(&c, &t)| if is_core(c, t) { c } else { 0 }).collect();
+        grid.grow(&core, &mut label);
+        let free: Vec<u8> = core.iter().zip(&label).map(|(&c, &l)| if l == 0 { c } else { 0 }).collect();
+        last = grid.components(&free, min_seed, &mut label, last);
     }
-    grid.table(&class, &label, count)
+    grid.table(&class, &label, last)
 }
 
+const LEAF: u8 = Semantic::Leaf as u8;
+const STEM: u8 = Semantic::Stem as u8;
+const MAIN: u8 = Semantic::MainStem as u8;
+
 fn kind(class: u8) -> Option<OrganKind> {
-    const LEAF: u8 = Semantic::Leaf as u8;
-    const STEM: u8 = Semantic::Stem as u8;
-    const MAIN: u8 = Semantic::MainStem as u8;
     match class {
         LEAF => Some(OrganKind::Leaf),
         STEM => Some(OrganKind::Stem),
@@ -82,9 +83,23 @@ struct Grid<'a> {
     jump: f32,
 }
 
-impl Grid<'_> {
+impl<'a> Grid<'a> {
+    fn of(view: &View<'a>, class: &[u8]) -> Self {
+        let (width, log_depth) = (view.intrinsics.width as usize, view.log_depth.as_raw());
+        let mut steps: Vec<f32> = (1..class.len())
+            .filter(|&p| p % width > 0 && class[p] != 0 && class[p - 1] != 0)
+            .map(|p| (log_depth[p] - log_depth[p - 1]).abs())
+            .filter(|step| step.is_finite())
+            .collect();
+        let middle = steps.len() / 2;
+        let median = if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f32::total_cmp).1 };
+        let slope = (MAX_SLOPE / view.intrinsics.fx.min(view.intrinsics.fy)) as f32;
+        let height = view.intrinsics.height as usize;
+        Self { width, height, log_depth, jump: slope.max(BLUR_STEPS * median) }
+    }
+
     /// The up to eight neighbours of pixel `p` that are not before or behind it: stems one pixel wide run diagonally.
-    fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> {
+    fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> + use<'_, 'a> {
         let (x, y, width, height) = (p % self.width, p / self.width, self.width, self.height);
         let (log_depth, jump) = (self.log_depth, self.jump);
         let apart = move |q: usize| (log_depth[q] - log_depth[p]).abs() > jump;
@@ -93,19 +108,15 @@ impl Grid<'_> {
             .filter(move |&q| q != p && !apart(q))
     }
 
-    /// Connected pixels of equal, non-zero `key`, at least `min` of them: labels from `first` + 1 on, and the last.
-    fn components(&self, key: &[u8], min: usize, first: u32) -> (Vec<u32>, u32) {
-        let mut label = vec![0u32; key.len()];
+    /// Labels connected pixels of equal, non-zero `key`, at least `min` of them, from `last` + 1 on; gives the last.
+    fn components(&self, key: &[u8], min: usize, label: &mut [u32], mut last: u32) -> u32 {
         let mut seen = vec![false; key.len()];
-        let mut last = first;
-        let mut patch = Vec::new();
         for start in 0..key.len() {
             if key[start] == 0 || seen[start] {
                 continue;
             }
-            patch.clear();
-            patch.push(start);
             seen[start] = true;
+            let mut patch = vec![start];
             let mut next = 0;
             while next < patch.len() {
                 for q in self.neighbours(patch[next]) {
@@ -118,12 +129,29 @@ impl Grid<'_> {
             }
             if patch.len() >= min {
                 last += 1;
-                for &p in &patch {
+                for p in patch {
                     label[p] = last;
                 }
             }
         }
-        (label, last)
+        last
+    }
+
+    /// Gives patches of main stem that are too small for one to the leaves.
+    fn hanging_tips_to_leaf(&self, class: &mut [u8]) {
+        let main: Vec<u8> = class.iter().map(|&c| if c == MAIN { c } else { 0 }).collect();
+        let mut label = vec![0; class.len()];
+        let count = self.components(&main, 1, &mut label, 0);
+        let mut sizes = vec![0usize; count as usize + 1];
+        for &l in &label {
+            sizes[l as usize] += 1;
+        }
+        let largest = sizes.iter().skip(1).copied().max().unwrap_or(0) as f64;
+        for (c, &l) in class.iter_mut().zip(&label) {
+            if l > 0 && (sizes[l as usize] as f64) < MIN_STEM_SHARE * largest {
+                *c = LEAF;
+            }
+        }
     }
 
     /// Gives every pixel that a label reaches inside its class the nearest one (breadth first, so in steps).

@@ -11,6 +11,11 @@ use crate::organs::OrganCloud;
 /// A surface seen steeper than this (tangent of the angle between its normal and the ray) is taken for a depth edge:
 /// 84 degrees, where a pixel's depth says little. Ours; the paper only says "gradient".
 pub(super) const MAX_SLOPE: f64 = 10.0;
+/// When an instance would lose more than this share of its pixels at depth edges, the network's depth is blurred over
+/// more than the organ's width and edges are everywhere: a plane through its log depth takes its place (a guess).
+const MAX_EDGES: f64 = 0.5;
+/// Weight of a flat organ (all at one depth) in that plane, as a share of the pixels: blur makes steep planes of noise.
+const FLATNESS: f64 = 0.05;
 /// Fewest points of a stem and of a leaf at 640 x 480 (paper supp. "2D Reconstruction").
 const MIN_STEM: f64 = 30.0;
 const MIN_LEAF: f64 = 100.0;
@@ -63,19 +68,22 @@ pub struct Lifted {
 /// when `scale` is metric.
 #[must_use]
 pub fn lift(view: &View<'_>, raster: &Instances, regions: &[Region], scale: DepthScale) -> Lifted {
-    let mut clouds: Vec<(Vec<DVec3>, Vec<u32>)> = vec![Default::default(); regions.len()];
-    let target_from_camera = view.world_from_camera.unwrap_or(Pose::IDENTITY);
-    let width = view.intrinsics.width as usize;
+    let mut pixels: Vec<Vec<u32>> = vec![Vec::new(); regions.len()];
     for (p, &id) in raster.as_raw().iter().enumerate() {
-        let Some((points, source)) = usize::from(id).checked_sub(1).and_then(|i| clouds.get_mut(i)) else { continue };
-        let Some(z) = view.depth(p, scale.factor) else { continue };
-        if steep(view, raster.as_raw(), p) {
-            continue;
+        if let Some(pixels) = usize::from(id).checked_sub(1).and_then(|i| pixels.get_mut(i)) {
+            pixels.push(p as u32);
         }
-        let at = DVec2::new((p % width) as f64 + 0.5, (p / width) as f64 + 0.5);
-        points.push(target_from_camera.point(view.intrinsics.unproject(at, z)));
-        source.push(p as u32);
     }
+    let target_from_camera = view.world_from_camera.unwrap_or(Pose::IDENTITY);
+    let width = view.intrinsics.width;
+    let unproject = |&(p, log_depth): &(u32, f64)| {
+        let at = DVec2::new(f64::from(p % width) + 0.5, f64::from(p / width) + 0.5);
+        let z = scale.depth(log_depth)?;
+        Some((target_from_camera.point(view.intrinsics.unproject(at, z)), p))
+    };
+    let clouds = pixels.iter().map(|pixels| {
+        depths(view, raster.as_raw(), pixels).iter().filter_map(unproject).unzip::<_, _, Vec<DVec3>, Vec<u32>>()
+    });
     let mut lifted = Lifted::default();
     for (region, (points, source)) in regions.iter().zip(clouds) {
         let least = view.pixels(if region.kind == OrganKind::Leaf { MIN_LEAF } else { MIN_STEM });
@@ -95,6 +103,37 @@ pub fn lift(view: &View<'_>, raster: &Instances, regions: &[Region], scale: Dept
         }
     }
     lifted
+}
+
+/// Pixels of an instance with their log depth: those away from depth edges, or, where edges are everywhere, all of them
+/// on a plane.
+fn depths(view: &View<'_>, raster: &[u16], pixels: &[u32]) -> Vec<(u32, f64)> {
+    let log_depth = view.log_depth.as_raw();
+    let seen: Vec<(u32, f64)> =
+        pixels.iter().map(|&p| (p, f64::from(log_depth[p as usize]))).filter(|(_, d)| d.is_finite()).collect();
+    let clear: Vec<(u32, f64)> = seen.iter().copied().filter(|&(p, _)| !steep(view, raster, p as usize)).collect();
+    if (clear.len() as f64) >= (1.0 - MAX_EDGES) * seen.len() as f64 {
+        return clear;
+    }
+    plane(&seen, view.intrinsics.width)
+}
+
+/// Log depths replaced by their least-squares plane over the picture.
+fn plane(seen: &[(u32, f64)], width: u32) -> Vec<(u32, f64)> {
+    let at = |p: u32| DVec2::new(f64::from(p % width), f64::from(p / width));
+    let count = seen.len().max(1) as f64;
+    let centre = seen.iter().map(|&(p, _)| at(p)).sum::<DVec2>() / count;
+    let mean = seen.iter().map(|&(_, d)| d).sum::<f64>() / count;
+    let (mut spread, mut slope) = (glam::DMat2::ZERO, DVec2::ZERO);
+    for &(p, d) in seen {
+        let x = at(p) - centre;
+        spread += glam::DMat2::from_cols(x * x.x, x * x.y);
+        slope += x * (d - mean);
+    }
+    // The prior acts on both directions as much as on the longer one: across a thin organ there is only blur.
+    let prior = FLATNESS * (spread.x_axis.x + spread.y_axis.y).max(1.0);
+    let slope = (spread + glam::DMat2::from_diagonal(DVec2::splat(prior))).inverse() * slope;
+    seen.iter().map(|&(p, _)| (p, mean + slope.dot(at(p) - centre))).collect()
 }
 
 /// Whether depth changes too fast towards a neighbour of the same instance. Across instances it may jump: that is one

@@ -97,13 +97,6 @@ impl View<'_> {
         let area = f64::from(self.intrinsics.width) * f64::from(self.intrinsics.height);
         (at_vga * area / (640.0 * 480.0)).ceil() as usize
     }
-
-    /// Camera-frame depth of pixel `p` (row major) under a factor on exp(log depth); `None` where there is none.
-    fn depth(&self, p: usize, factor: f64) -> Option<f64> {
-        let z = f64::from(self.log_depth.as_raw()[p]).exp() * factor;
-        // 1 km: beyond any plant, and far from where squares overflow.
-        (z > 1e-6 && z < 1e3).then_some(z)
-    }
 }
 
 #[cfg(test)]

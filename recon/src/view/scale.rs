@@ -27,6 +27,16 @@ pub struct DepthScale {
     pub spread: f64,
 }
 
+impl DepthScale {
+    /// Depth along the camera's axis from its logarithm; `None` where that makes no depth.
+    #[must_use]
+    pub(super) fn depth(&self, log_depth: f64) -> Option<f64> {
+        let z = log_depth.exp() * self.factor;
+        // 1 km: beyond any plant, and far from where squares overflow.
+        (z > 1e-6 && z < 1e3).then_some(z)
+    }
+}
+
 /// Why there is no scale.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum ScaleError {
