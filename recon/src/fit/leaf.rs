@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::centreline::{angles_along, course, length, resample};
 use super::solver::{Normal, minimise};
 use super::stem::{clipped, mean, median};
-use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, gauge, node, vein_angle};
+use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, VEIN, gauge, node, vein_angle};
 use crate::model::{Habit, Species};
 use crate::nearest::{Nearest, Neighbour};
 
@@ -22,6 +22,10 @@ const LOOKOUT: (usize, usize) = (2, 3);
 const NOISE: f64 = 0.01;
 /// Independent observations that a blade's points amount to: neighbours err together (a guess).
 const INDEPENDENT: f64 = 150.0;
+
+/// A blade is turned when its main vein then strays from the course by less than this share (a guess: scans that show
+/// the blade's width are left as they are).
+const TURN: f64 = 0.6;
 
 /// A fitted blade in the world.
 #[derive(Clone, Debug)]
@@ -91,20 +95,36 @@ impl<'a> Data<'a> {
         Self { base, points, tree, spacing, species }
     }
 
+    /// A strap that bends within the picture of a single view looks like a blade that bows within itself, which blades
+    /// hardly do: when the course cannot be followed so, the blade is turned by a quarter about its chord and arches.
     fn first_guess(&self, up: DVec3) -> State {
         let path = resample(&course(&self.points, self.base, SLICES), ROWS);
-        let metres = self.species.ranges.blade_length.clamp(length(&path));
-        let across = self.across(&path, up);
+        let chord = path[path.len() - 1] - path[0];
+        let widest = self.across(&path);
+        let facing_up = |across: DVec3| if across.cross(chord).dot(up) < 0.0 { -across } else { across };
+        let flat = self.guess(&path, facing_up(widest));
+        let arched = self.guess(&path, facing_up(widest.cross(chord.normalize_or_zero())));
+        if self.stray(&arched, &path) < TURN * self.stray(&flat, &path) { arched } else { flat }
+    }
+
+    /// Mean distance of a blade's main vein from the course it should follow, metres.
+    fn stray(&self, state: &State, path: &[DVec3]) -> f64 {
+        let surface = self.posed(state, &self.species.leaf.grid(&state.blade()).points);
+        mean(path.iter().enumerate().map(|(i, p)| surface[node(i, VEIN)].distance(*p)))
+    }
+
+    fn guess(&self, path: &[DVec3], across: DVec3) -> State {
+        let metres = self.species.ranges.blade_length.clamp(length(path));
         let along = (path[1] - path[0]).normalize_or(DVec3::Y);
         let x = across.reject_from_normalized(along).normalize_or(along.any_orthonormal_vector());
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, along, x.cross(along)));
-        let vein = angles_along(&path, rotation);
+        let vein = angles_along(path, rotation);
         let mut angles = nalgebra::DVector::zeros(ANGLES);
         for i in 1..ROWS {
             angles[vein_angle(i)] = vein[2 * (i - 1)];
             angles[vein_angle(i) + 1] = vein[2 * (i - 1) + 1];
         }
-        let half_widths: Vec<f64> = self.points.iter().map(|p| (*p - nearest_of(&path, *p)).length()).collect();
+        let half_widths: Vec<f64> = self.points.iter().map(|p| (*p - nearest_of(path, *p)).length()).collect();
         let flat = self.species.leaf.flat(&[], 1.0);
         let typical = mean(flat.iter().map(|p| p.x.abs())) * metres;
         let width = self.species.ranges.blade_width.clamp(mean(half_widths.iter().copied()) / typical.max(1e-9));
@@ -117,9 +137,8 @@ impl<'a> Data<'a> {
         }
     }
 
-    /// The direction across the blade (left to right when its upper side faces `up`): the widest direction of the
-    /// points about the course.
-    fn across(&self, path: &[DVec3], up: DVec3) -> DVec3 {
+    /// The widest direction of the points about the course.
+    fn across(&self, path: &[DVec3]) -> DVec3 {
         let mut spread = nalgebra::Matrix3::zeros();
         for p in &self.points {
             let d = *p - nearest_of(path, *p);
@@ -128,10 +147,7 @@ impl<'a> Data<'a> {
         }
         let eigen = spread.symmetric_eigen();
         let v = eigen.eigenvectors.column(eigen.eigenvalues.imax());
-        let across = DVec3::new(v[0], v[1], v[2]);
-        let chord = path[path.len() - 1] - path[0];
-        // x × y = z: the upper side.
-        if across.cross(chord).dot(up) < 0.0 { -across } else { across }
+        DVec3::new(v[0], v[1], v[2])
     }
 
     fn posed(&self, state: &State, raw: &[DVec3]) -> Vec<DVec3> {

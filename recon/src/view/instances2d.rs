@@ -10,9 +10,9 @@ use super::lift::MAX_SLOPE;
 use crate::model::OrganKind;
 
 /// Truncated inverse distances below which seeds are looked for, one after the other: what is far from every other
-/// organ first, then the thin and the crowded. t saturates at 1 within δ = 1 % of the picture's diagonal, so 0.6 is 1.7 δ
-/// and the last is everything (ours to tune, reconstruction.md "Points to organs").
-const LEVELS: [f32; 3] = [0.6, 0.9, f32::INFINITY];
+/// organ first, then the thin and the crowded. t saturates at 1 within δ = 1 % of the picture's diagonal, so 0.8 is 1.25
+/// δ and the last is everything (ours to tune, reconstruction.md "Points to organs").
+const LEVELS: [f32; 2] = [0.8, f32::INFINITY];
 /// A patch of main stem with less than this share of the largest one's pixels is the tip of a leaf that hangs like a
 /// stem, and counts as leaf (a guess; plants in one picture are of a size, and a plant without a stem gets one later).
 const MIN_STEM_SHARE: f64 = 0.2;
