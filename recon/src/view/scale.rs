@@ -8,9 +8,13 @@ use crate::organs::ScaleSource;
 
 /// Fewest ground pixels, as a share of the picture: 2 % is 130 x 47 pixels at 640 x 480 (a guess).
 const MIN_GROUND: f64 = 0.02;
-/// Largest spread (median absolute deviation) of the logarithm of the factor over the ground pixels: 0.15 is 15 % of a
-/// length, more means that network and ground plane tell different scenes (a guess).
+/// Largest spread of the logarithm of depth about the ground's: 0.15 is 15 % of a length, more means that network and
+/// ground plane tell different scenes (a guess).
 const MAX_SPREAD: f64 = 0.15;
+/// Exponents that a network may need; beyond them its depths and the ground's have little to do with each other (guesses).
+const EXPONENTS: (f64, f64) = (0.5, 3.0);
+/// Rounds of the line's fit; each gives pixels far off the last line less weight.
+const ROUNDS: usize = 8;
 /// Ground farther than this says little of a factor: the plane is seen too flat and fields are not that even, metres.
 const MAX_GROUND_DEPTH: f64 = 10.0;
 /// Plant depth when nothing tells it, metres: proportions hold, lengths mean nothing.
@@ -19,11 +23,13 @@ const NOMINAL_DEPTH: f64 = 1.0;
 /// What turns exp(log depth) into depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthScale {
-    /// Depth = factor * exp(log depth).
+    /// Depth = factor * exp(exponent * log depth).
     pub factor: f64,
+    /// What stretches the network's range of depths, which is often too narrow; 1 where nothing tells it.
+    pub exponent: f64,
     /// Where the factor comes from.
     pub source: ScaleSource,
-    /// Spread of the factor's logarithm where it was measured, else 0.
+    /// Spread (median absolute deviation) of the logarithm of depth about the ground's where it was measured, else 0.
     pub spread: f64,
 }
 
@@ -31,7 +37,7 @@ impl DepthScale {
     /// Depth along the camera's axis from its logarithm; `None` where that makes no depth.
     #[must_use]
     pub(super) fn depth(&self, log_depth: f64) -> Option<f64> {
-        let z = log_depth.exp() * self.factor;
+        let z = (self.exponent * log_depth).exp() * self.factor;
         // 1 km: beyond any plant, and far from where squares overflow.
         (z > 1e-6 && z < 1e3).then_some(z)
     }
@@ -64,14 +70,16 @@ pub enum ScaleError {
     NoDepth,
 }
 
-/// The factor that lays the background on the ground plane z = 0: the median over its pixels.
+/// The factor and exponent that lay the background on the ground plane z = 0: the line of the plane's log depth over
+/// the network's, by iteratively reweighted least squares.
 ///
 /// # Errors
 /// [`ScaleError`] when the ground does not tell.
 pub fn ground_plane(view: &View<'_>) -> Result<DepthScale, ScaleError> {
     let pose = view.world_from_camera.ok_or(ScaleError::NoPose)?;
     let width = view.intrinsics.width as usize;
-    let mut logs: Vec<f64> = Vec::new();
+    // The network's log depth and the plane's, of each ground pixel.
+    let mut logs: Vec<(f64, f64)> = Vec::new();
     for (p, &class) in view.semantic.as_raw().iter().enumerate() {
         let at = DVec2::new((p % width) as f64 + 0.5, (p / width) as f64 + 0.5);
         // The ray has z = 1 in the camera, so its parameter is depth.
@@ -79,20 +87,45 @@ pub fn ground_plane(view: &View<'_>) -> Result<DepthScale, ScaleError> {
         let depth = -pose.translation.z / ray.z;
         let seen = f64::from(view.log_depth.as_raw()[p]);
         if class == Semantic::Background as u8 && depth > 0.0 && depth < MAX_GROUND_DEPTH && seen.is_finite() {
-            logs.push(depth.ln() - seen);
+            logs.push((seen, depth.ln()));
         }
     }
     let expected = (MIN_GROUND * view.semantic.as_raw().len() as f64).ceil() as usize;
     if logs.len() < expected.max(1) {
         return Err(ScaleError::FewPixels { expected, found: logs.len() });
     }
-    let middle = median(&mut logs);
-    let mut away: Vec<f64> = logs.iter().map(|l| (l - middle).abs()).collect();
+    let (exponent, offset) = line(&logs);
+    let mut away: Vec<f64> = logs.iter().map(|(x, y)| (exponent * x + offset - y).abs()).collect();
     let spread = median(&mut away);
-    if spread > MAX_SPREAD {
+    if !(spread <= MAX_SPREAD && offset.exp().is_normal()) {
         return Err(ScaleError::Spread { expected: MAX_SPREAD, found: spread });
     }
-    Ok(DepthScale { factor: middle.exp(), source: ScaleSource::GroundPlane, spread })
+    Ok(DepthScale { factor: offset.exp(), exponent, source: ScaleSource::GroundPlane, spread })
+}
+
+/// Slope and offset of the line through points that most of them agree on; the slope stays in [`EXPONENTS`], and is 1
+/// where the points do not differ enough to tell.
+fn line(points: &[(f64, f64)]) -> (f64, f64) {
+    // Differences of log depth below this tell noise: 2 % of a depth.
+    const TELLING: f64 = 0.02;
+    let (mut slope, mut offset) = (1.0, 0.0);
+    for round in 0..ROUNDS {
+        let weight = |x: f64, y: f64| if round == 0 { 1.0 } else { 1.0 / (slope * x + offset - y).abs().max(TELLING) };
+        let (mut total, mut mx, mut my) = (0.0, 0.0, 0.0);
+        for &(x, y) in points {
+            let w = weight(x, y);
+            (total, mx, my) = (total + w, mx + w * x, my + w * y);
+        }
+        (mx, my) = (mx / total, my / total);
+        let (mut xx, mut xy) = (0.0, 0.0);
+        for &(x, y) in points {
+            let w = weight(x, y) / total;
+            (xx, xy) = (xx + w * (x - mx) * (x - mx), xy + w * (x - mx) * (y - my));
+        }
+        slope = if xx > TELLING * TELLING { (xy / xx).clamp(EXPONENTS.0, EXPONENTS.1) } else { 1.0 };
+        offset = my - slope * mx;
+    }
+    (slope, offset)
 }
 
 /// The factor that puts the organ pixels at 1 m (median): a scale that says `none`.
@@ -108,7 +141,8 @@ pub fn nominal(view: &View<'_>) -> Result<DepthScale, ScaleError> {
     if logs.is_empty() {
         return Err(ScaleError::NoDepth);
     }
-    Ok(DepthScale { factor: NOMINAL_DEPTH * (-median(&mut logs)).exp(), source: ScaleSource::None, spread: 0.0 })
+    let factor = NOMINAL_DEPTH * (-median(&mut logs)).exp();
+    Ok(DepthScale { factor, exponent: 1.0, source: ScaleSource::None, spread: 0.0 })
 }
 
 /// The middle of at least one number, reordering them.

@@ -207,6 +207,11 @@ fn the_ground_gives_metres_whatever_constant_the_network_adds() {
         assert!((scale.factor.ln() + f64::from(shift)).abs() < 1e-4, "{scale:?}");
     }
     assert_eq!(scene.with(None, ground_plane), Err(ScaleError::NoPose));
+    // A network that tells only half of the range, with plants before the ground, which are no ground.
+    let mut narrow = over_the_ground().0;
+    narrow.log_depth.pixels_mut().for_each(|pixel| pixel.0[0] = 0.5 * pixel.0[0] + 0.3);
+    let scale = narrow.with(Some(pose), ground_plane).unwrap();
+    assert!((scale.exponent - 2.0).abs() < 1e-3 && (scale.factor.ln() + 0.6).abs() < 1e-3, "{scale:?}");
     for (i, pixel) in scene.log_depth.pixels_mut().enumerate() {
         pixel.0[0] += (i % 7) as f32;
     }
