@@ -22,6 +22,8 @@ pub struct Config {
     pub store: StoreConfig,
     /// Where the page and the API listen.
     pub api: ApiConfig,
+    /// Where frames come from; without it stored plants are served and nothing else.
+    pub source: Option<SourceConfig>,
 }
 
 /// `[store]`.
@@ -50,6 +52,37 @@ impl Default for ApiConfig {
     fn default() -> Self {
         Self { listen: (Ipv4Addr::LOCALHOST, 8420).into() }
     }
+}
+
+/// `[source]`, chosen by its key `kind`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum SourceConfig {
+    /// A recorded session, at the pace it was recorded.
+    Replay {
+        /// The session's folder.
+        session: PathBuf,
+    },
+    /// A row of the synthetic world.
+    Synthetic {
+        /// A species that ships.
+        #[serde(default = "soybean")]
+        species: String,
+        /// Plants in the row.
+        #[serde(default = "six")]
+        plants: u16,
+        /// The same seed gives the same row.
+        #[serde(default)]
+        seed: u64,
+    },
+}
+
+fn soybean() -> String {
+    "soybean".into()
+}
+
+fn six() -> u16 {
+    6
 }
 
 /// Why a configuration is refused; every message names the file.
@@ -181,10 +214,13 @@ mod tests {
         for (text, parts) in [
             ("[stroe]\npath = 'x'", &["stroe", "did you mean `store`?"][..]),
             ("[api]\nlistn = '127.0.0.1:1'", &["listn", "did you mean `listen`?"]),
-            ("[harvester]", &["harvester", "expected `store` or `api`"]),
+            ("[harvester]", &["harvester", "expected one of `store`, `api`, `source`"]),
             ("[store]\npath = 5", &["path = 5", "integer", "expected"]),
             ("[api]\nlisten = 'here'", &["listen = 'here'", "address"]),
             ("[api]\nlisten = '0.0.0.0:8420'", &["api.listen", "loopback", "0.0.0.0:8420"]),
+            ("[source]\nkind = 'camera'", &["camera", "`replay`"]),
+            ("[source]\nkind = 'replay'\nsesion = 'x'", &["sesion", "did you mean `session`?"]),
+            ("[source]\nkind = 'synthetic'\nplants = -1", &["-1", "expected u16"]),
             ("[store", &["line 1"]),
             ("\u{0}", &["line 1"]),
         ] {

@@ -20,3 +20,4 @@ pub mod reconstruct;
 pub mod report;
 pub mod store;
 pub mod synthetic;
+pub mod worker;

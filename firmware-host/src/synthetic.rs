@@ -2,7 +2,7 @@
 
 use std::io;
 
-use demeter_capture::{Source, SourceError};
+use demeter_capture::{Manifest, Row as SownRow, SCHEMA_VERSION, SessionCamera, Source, SourceError};
 use demeter_frame::{CameraId, Frame, Intrinsics, Pinhole, PixelFormat, Pose, Stamp};
 use demeter_recon::model::Species;
 use demeter_recon::world::{self, Row, Scene, Sensor, WorldError, seeded};
@@ -45,6 +45,25 @@ impl Synthetic {
     ) -> Result<Self, WorldError> {
         let (scene, poses) = world::row(species, plan, &intrinsics, seed)?;
         Ok(Self { scene, poses, camera: CameraId("side".into()), intrinsics, boot_id, seed, next: 0 })
+    }
+
+    /// The session that the frames belong to; `plan` is the row that they were made from.
+    #[must_use]
+    pub fn manifest(&self, species: &str, plan: &Row) -> Manifest {
+        let camera = SessionCamera {
+            id: self.camera.clone(),
+            height_above_ground_m: self.poses.first().map(|pose| pose.translation.z),
+            intrinsics: self.intrinsics,
+            rig_from_camera: None,
+        };
+        Manifest {
+            schema_version: SCHEMA_VERSION,
+            rig_id: "synthetic".into(),
+            session_id: self.boot_id.clone(),
+            species: species.into(),
+            cameras: vec![camera],
+            rows: vec![SownRow { row: "1".into(), plot: None, plant_spacing_m: Some(plan.spacing) }],
+        }
     }
 
     fn frame(&self, seq: usize) -> io::Result<Frame> {

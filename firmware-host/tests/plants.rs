@@ -5,8 +5,10 @@ mod common;
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::net::UnixDatagram;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
 use common::{Bench, bench};
 
@@ -103,19 +105,28 @@ fn what_is_not_there_is_named_and_ends_with_the_contracts_code() {
     }
 }
 
-#[test]
-fn the_daemon_says_ready_answers_and_ends_well_on_sigterm() {
-    let bench = stored(2);
+/// A daemon that does not outlive a test that failed.
+struct Daemon(Child);
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        // It may have ended already.
+        self.0.kill().unwrap_or_default();
+    }
+}
+
+/// A running daemon that was told to listen on a free port, and its address.
+fn daemon(bench: &Bench, source: &str) -> (Daemon, String) {
     let notify = bench.folder.path().join("notify");
-    let socket = std::os::unix::net::UnixDatagram::bind(&notify).unwrap();
-    socket.set_read_timeout(Some(std::time::Duration::from_secs(30))).unwrap();
-    let config = bench.folder.path().join("demeter.toml");
-    std::fs::write(&config, "[store]\npath = 'demeter.sqlite'\n[api]\nlisten = '127.0.0.1:0'\n").unwrap();
+    let socket = UnixDatagram::bind(&notify).unwrap();
+    socket.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    let config = format!("[store]\npath = 'demeter.sqlite'\n[api]\nlisten = '127.0.0.1:0'\n{source}");
+    std::fs::write(bench.folder.path().join("demeter.toml"), config).unwrap();
     let mut daemon = Command::new(env!("CARGO_BIN_EXE_demeter"))
-        .args(["run", "--config"])
-        .arg(&config)
+        .args(["run", "--config", "demeter.toml"])
         .current_dir(bench.folder.path())
         .env("NOTIFY_SOCKET", &notify)
+        .env("DEMETER_ONNXRUNTIME", "/no/such/library.so")
         .env_remove("RUST_LOG")
         .stderr(Stdio::piped())
         .spawn()
@@ -123,20 +134,59 @@ fn the_daemon_says_ready_answers_and_ends_well_on_sigterm() {
     let mut ready = [0; 64];
     let length = socket.recv(&mut ready).unwrap();
     assert_eq!(text(&ready[..length]).trim(), "READY=1");
-
     let mut log = BufReader::new(daemon.stderr.take().unwrap()).lines();
     let line = log.find(|line| line.as_ref().unwrap().contains("http://")).unwrap().unwrap();
-    let address = line.split("http://").nth(1).unwrap().trim();
+    std::thread::spawn(move || log.for_each(drop));
+    (Daemon(daemon), line.split("http://").nth(1).unwrap().trim().to_owned())
+}
+
+fn get(address: &str, path: &str) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
-    write!(stream, "GET /healthz HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").unwrap();
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").unwrap();
     let mut answer = String::new();
     stream.read_to_string(&mut answer).unwrap();
-    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+    answer
+}
 
-    let killed = Command::new("kill").args(["-TERM", &daemon.id().to_string()]).status().unwrap();
+fn terminate(mut daemon: Daemon) {
+    let killed = Command::new("kill").args(["-TERM", &daemon.0.id().to_string()]).status().unwrap();
     assert!(killed.success());
-    assert_eq!(daemon.wait().unwrap().code(), Some(0));
+    assert_eq!(daemon.0.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn the_daemon_says_ready_answers_and_ends_well_on_sigterm() {
+    let bench = stored(2);
+    let (daemon, address) = daemon(&bench, "");
+    assert!(get(&address, "/healthz").starts_with("HTTP/1.1 200"));
+    assert!(get(&address, "/api/v1/status").contains("\"idle\""));
+    // A client that sends nothing and never closes does not keep it.
+    let _silent = TcpStream::connect(&address).unwrap();
+    terminate(daemon);
     assert_eq!(bench.number("SELECT count(*) FROM plants"), 2);
+}
+
+#[test]
+fn a_source_that_cannot_start_is_said_on_the_page_and_plants_are_still_served() {
+    for (source, why) in [
+        ("[source]\nkind = 'replay'\nsession = 'no-such-session'", "no-such-session"),
+        ("[source]\nkind = 'synthetic'\nplants = 1", "/no/such/library.so"),
+        ("[source]\nkind = 'synthetic'\nspecies = 'oak'", "soybean"),
+    ] {
+        let bench = stored(1);
+        let (daemon, address) = daemon(&bench, source);
+        let mut status = String::new();
+        for _ in 0..600 {
+            status = get(&address, "/api/v1/status");
+            if !status.contains("\"working\"") {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        assert!(status.contains("\"failed\"") && status.contains(why), "{source}: {status}");
+        assert!(get(&address, "/api/v1/plants/row-0001").starts_with("HTTP/1.1 200"));
+        terminate(daemon);
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod plants;
 mod reply;
 mod status;
 
-use std::future::Future;
+use std::future::{Future, IntoFuture};
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -18,6 +18,7 @@ use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::get;
 use metrics_exporter_prometheus::{PrometheusHandle, PrometheusRecorder};
 use tokio::net::TcpListener;
+use tokio::sync::Notify;
 
 use crate::store::{Reader, StoreError};
 use reply::ApiError;
@@ -53,22 +54,19 @@ impl Api {
     ///
     /// # Errors
     /// The listener's own.
-    pub async fn serve(
-        self,
-        listener: TcpListener,
-        stop: impl Future<Output = ()> + Send + 'static,
-    ) -> std::io::Result<()> {
-        let (stopping, stopped) = tokio::sync::oneshot::channel();
-        let signal = async move {
-            stop.await;
-            // The receiver waits as long as the server runs.
-            stopping.send(()).unwrap_or_default();
-        };
-        let server = axum::serve(listener, self.routes()).with_graceful_shutdown(signal);
+    pub async fn serve(self, listener: TcpListener, stop: impl Future<Output = ()>) -> std::io::Result<()> {
+        let stopped = Arc::new(Notify::new());
+        let signal = stopped.clone();
+        let server =
+            axum::serve(listener, self.routes()).with_graceful_shutdown(async move { signal.notified().await });
+        let mut server = std::pin::pin!(server.into_future());
         tokio::select! {
-            result = server => result,
-            // A client that never closes must not keep the program.
-            () = async { stopped.await.unwrap_or_default(); tokio::time::sleep(GRACE).await } => Ok(()),
+            result = &mut server => result,
+            () = stop => {
+                stopped.notify_one();
+                // A client that never closes must not keep the program.
+                tokio::time::timeout(GRACE, server).await.unwrap_or(Ok(()))
+            }
         }
     }
 

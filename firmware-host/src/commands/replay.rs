@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 
 use demeter_capture::{Pace, Replay, Source};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -50,7 +51,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let mut eye = Eye::open(NonZeroUsize::MIN)?;
     let store = Store::open(&args.db)?;
     let bar = progress_bar(source.len_hint());
-    let run = Run { manifest: &manifest, species: &species, store: &store };
+    let run = Run { manifest: &manifest, species: &species, store: &store, stop: &AtomicBool::new(false) };
     let outcome = pipeline::run(&run, &mut source, &mut eye, |progress| match progress {
         Progress::Frame => bar.inc(1),
         Progress::Plant(plant) => bar.set_message(plant.id.clone().unwrap_or_default()),

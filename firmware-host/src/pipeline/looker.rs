@@ -1,6 +1,7 @@
 //! The second stage: network, lifting, and which plant along the row each sight belongs to.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Instant;
 
@@ -56,8 +57,8 @@ impl<'a> Looker<'a> {
         Self { manifest, eye, tracker: Tracker::new(Gate::of_spacing(spacing)), odometer: Odometer::default() }
     }
 
-    /// Works until no more frames come or nobody listens.
-    pub(super) fn look(mut self, frames: Receiver<Arrival>, to: &SyncSender<Found>) {
+    /// Works until no more frames come or nobody listens. A run that was stopped leaves the plants in view out.
+    pub(super) fn look(mut self, frames: Receiver<Arrival>, stop: &AtomicBool, to: &SyncSender<Found>) {
         for arrival in frames {
             let found = match arrival {
                 Arrival::Refused { frame, reason, message } => vec![Found::Refused { frame, reason, message }],
@@ -66,6 +67,9 @@ impl<'a> Looker<'a> {
             if found.into_iter().any(|found| to.send(found).is_err()) {
                 return;
             }
+        }
+        if stop.load(Ordering::Relaxed) {
+            return;
         }
         for plant in self.tracker.finish() {
             if to.send(Found::Plant(Box::new(plant))).is_err() {

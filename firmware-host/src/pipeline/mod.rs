@@ -13,6 +13,7 @@ mod looker;
 mod reader;
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
@@ -37,6 +38,9 @@ pub struct Run<'a> {
     pub species: &'a Species,
     /// Where plants go.
     pub store: &'a Store,
+    /// Set from outside, it ends the run soon. Plants that are not stored by then are left out, because half-seen ones
+    /// would stand in the way of the whole ones when the same recording is replayed.
+    pub stop: &'a AtomicBool,
 }
 
 /// What happened, told as it happens.
@@ -106,9 +110,10 @@ pub fn run(
     let joined = std::thread::scope(|scope| {
         let (to_looker, frames) = sync_channel(FRAMES_WAITING);
         let (to_keeper, sights) = sync_channel(PLANTS_WAITING);
-        let reader = scope.spawn(move || reader::read(source, &to_looker));
-        let looker = scope.spawn(move || looker::Looker::new(run.manifest, eye).look(frames, &to_keeper));
-        let kept = sights.into_iter().try_for_each(|found| keeper.take(found, &mut progress));
+        let reader = scope.spawn(move || reader::read(source, run.stop, &to_looker));
+        let looker = scope.spawn(move || looker::Looker::new(run.manifest, eye).look(frames, run.stop, &to_keeper));
+        let going = |_: &_| !run.stop.load(Ordering::Relaxed);
+        let kept = sights.into_iter().take_while(going).try_for_each(|found| keeper.take(found, &mut progress));
         // With the receiver gone the stages before end at their next send.
         let counts = reader.join().map_err(|_panic| PipelineError::Panicked { stage: "reader" });
         let looked = looker.join().map_err(|_panic| PipelineError::Panicked { stage: "looker" });

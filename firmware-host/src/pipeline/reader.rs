@@ -1,5 +1,6 @@
 //! The first stage: frames from a source, through the gate.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 
 use demeter_capture::{Counts, Gate, GateConfig, Source, SourceError};
@@ -22,10 +23,10 @@ pub(super) enum Arrival {
     },
 }
 
-/// Reads to the end of the source, or until nobody listens; gives the gate's counts and why the source ended early.
-pub(super) fn read(source: &mut dyn Source, to: &SyncSender<Arrival>) -> (Counts, Option<String>) {
+/// Reads to the end of the source, until it is told to stop or nobody listens; gives the gate's counts and why the source ended early.
+pub(super) fn read(source: &mut dyn Source, stop: &AtomicBool, to: &SyncSender<Arrival>) -> (Counts, Option<String>) {
     let mut gate = Gate::new(GateConfig::default());
-    loop {
+    while !stop.load(Ordering::Relaxed) {
         let arrival = match source.next() {
             Ok(None) => return (gate.counts().clone(), None),
             Ok(Some(frame)) => match gate.admit(&frame) {
@@ -43,7 +44,8 @@ pub(super) fn read(source: &mut dyn Source, to: &SyncSender<Arrival>) -> (Counts
             }
         };
         if to.send(arrival).is_err() {
-            return (gate.counts().clone(), None);
+            break;
         }
     }
+    (gate.counts().clone(), None)
 }

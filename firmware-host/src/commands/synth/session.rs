@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use demeter_capture::{Manifest, Recorder, Row as SownRow, SCHEMA_VERSION, SessionCamera, Source};
+use demeter_capture::{Recorder, Source};
 use demeter_frame::Intrinsics;
 use demeter_recon::world::{PlantTruth, Row, truth};
 use indicatif::ProgressBar;
@@ -58,23 +58,9 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let intrinsics = Intrinsics::from_hfov(width, height, args.hfov.to_radians());
     let plan = Row { plants: args.plants.into(), spacing: args.spacing, age: args.age, frames: args.frames.into() };
     let session_id = format!("synth-{}-{}", args.species, args.seed);
-    let mut rig = Synthetic::new(&species, &plan, intrinsics, args.seed, session_id.clone())
+    let mut rig = Synthetic::new(&species, &plan, intrinsics, args.seed, session_id)
         .map_err(|error| CommandError::failed("world", &error))?;
-    let camera = SessionCamera {
-        id: rig.camera.clone(),
-        height_above_ground_m: rig.poses.first().map(|pose| pose.translation.z),
-        intrinsics,
-        rig_from_camera: None,
-    };
-    let row = SownRow { row: "1".into(), plot: None, plant_spacing_m: Some(args.spacing) };
-    let manifest = Manifest {
-        schema_version: SCHEMA_VERSION,
-        rig_id: "synthetic".into(),
-        session_id,
-        species: args.species.clone(),
-        cameras: vec![camera],
-        rows: vec![row],
-    };
+    let manifest = rig.manifest(&args.species, &plan);
     let failed = |error: &dyn std::error::Error| CommandError::failed("session", error);
     let mut recorder = Recorder::create(&args.output, manifest).map_err(|error| failed(&error))?;
     let bar = ProgressBar::new(args.frames.into());
