@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::centreline::{angles_along, course, length, resample};
 use super::solver::{Normal, minimise};
 use super::stem::{clipped, mean, median};
-use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, VEIN, gauge, node, vein_angle};
+use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, gauge, node, vein_angle};
 use crate::model::{Habit, Species};
 use crate::nearest::{Nearest, Neighbour};
 
@@ -22,10 +22,6 @@ const LOOKOUT: (usize, usize) = (2, 3);
 const NOISE: f64 = 0.01;
 /// Independent observations that a blade's points amount to: neighbours err together (a guess).
 const INDEPENDENT: f64 = 150.0;
-
-/// A blade is turned when its main vein then strays from the course by less than this share (a guess: scans that show
-/// the blade's width are left as they are).
-const TURN: f64 = 0.6;
 
 /// A fitted blade in the world.
 #[derive(Clone, Debug)]
@@ -71,14 +67,11 @@ struct Data<'a> {
 pub(super) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -> LeafFit {
     let coarse = Data::new(points, base, species, FEW_POINTS);
     let fine = Data::new(points, base, species, MAX_POINTS);
-    // Along the course of its points, and straight: where blades fold, one of the two is nearer to the truth.
-    let guess = coarse.first_guess(up);
-    let straight = State { gamma: vec![0.0; guess.gamma.len()], ..guess.clone() };
-    let starts = [guess, straight].map(|mut state| {
+    let near = |mut state: State| {
         minimise(&mut state, 15, |s| coarse.normal(s), |s, step| coarse.apply(s, step));
         (coarse.normal(&state).cost, state)
-    });
-    let [first, second] = starts;
+    };
+    let [first, second] = coarse.first_guesses(up).map(near);
     let mut state = if second.0 < first.0 { second.1 } else { first.1 };
     let converged = minimise(&mut state, 12, |s| fine.normal(s), |s, step| fine.apply(s, step));
     fine.finish(state, converged)
@@ -95,22 +88,22 @@ impl<'a> Data<'a> {
         Self { base, points, tree, spacing, species }
     }
 
-    /// A strap that bends within the picture of a single view looks like a blade that bows within itself, which blades
-    /// hardly do: when the course cannot be followed so, the blade is turned by a quarter about its chord and arches.
-    fn first_guess(&self, up: DVec3) -> State {
+    /// Two starts, for what one cannot tell from afar. Flat: the blade spreads as its points do and follows their
+    /// course. The other for grasses: turned by a quarter, because a strap that arches within the picture of a single
+    /// view has points that spread along the arch, and blades hardly bow within themselves. The other for broad blades:
+    /// straight, because the course through a folded blade is not its main vein's.
+    fn first_guesses(&self, up: DVec3) -> [State; 2] {
         let path = resample(&course(&self.points, self.base, SLICES), ROWS);
         let chord = path[path.len() - 1] - path[0];
         let widest = self.across(&path);
         let facing_up = |across: DVec3| if across.cross(chord).dot(up) < 0.0 { -across } else { across };
         let flat = self.guess(&path, facing_up(widest));
-        let arched = self.guess(&path, facing_up(widest.cross(chord.normalize_or_zero())));
-        if self.stray(&arched, &path) < TURN * self.stray(&flat, &path) { arched } else { flat }
-    }
-
-    /// Mean distance of a blade's main vein from the course it should follow, metres.
-    fn stray(&self, state: &State, path: &[DVec3]) -> f64 {
-        let surface = self.posed(state, &self.species.leaf.grid(&state.blade()).points);
-        mean(path.iter().enumerate().map(|(i, p)| surface[node(i, VEIN)].distance(*p)))
+        let other = if self.species.habit == Habit::Grass {
+            self.guess(&path, facing_up(widest.cross(chord.normalize_or_zero())))
+        } else {
+            State { gamma: vec![0.0; flat.gamma.len()], ..flat.clone() }
+        };
+        [flat, other]
     }
 
     fn guess(&self, path: &[DVec3], across: DVec3) -> State {
