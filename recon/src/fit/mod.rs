@@ -79,9 +79,9 @@ pub enum FitError {
 }
 
 /// Fewest points of an organ.
-const MIN_POINTS: usize = 3;
+pub(crate) const MIN_POINTS: usize = 3;
 /// Least extent of an organ, metres.
-const MIN_EXTENT: f64 = 1e-4;
+pub(crate) const MIN_EXTENT: f64 = 1e-4;
 
 /// A parent on which organs can be hung.
 struct Hanger {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{MIN_ORGAN_POINTS, SegmentError, Segmented, Up, organ, split_stems};
+use super::{MIN_ORGAN_POINTS, SegmentError, Segmented, Up, is_fittable, organ, split_stems};
 use crate::model::{Habit, OrganKind};
 
 pub(super) fn segment(points: &[DVec3], labels: &[i32], habit: Habit, up: Up) -> Result<Segmented, SegmentError> {
@@ -25,5 +25,6 @@ pub(super) fn segment(points: &[DVec3], labels: &[i32], habit: Habit, up: Up) ->
     let mut organs = split_stems(points, &stems, up);
     let leaves = members.into_values().filter(|m| m.len() >= MIN_ORGAN_POINTS);
     organs.extend(leaves.map(|m| organ(points, OrganKind::Leaf, m)));
+    organs.retain(is_fittable);
     Ok(Segmented { organs, up })
 }

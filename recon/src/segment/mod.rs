@@ -8,7 +8,7 @@ mod up;
 use glam::DVec3;
 
 use crate::cloud::{PointCloud, diagonal};
-use crate::fit::median_of;
+use crate::fit::{self, median_of};
 use crate::graph::CloudGraph;
 use crate::model::{Habit, OrganKind};
 use crate::nearest::Nearest;
@@ -93,9 +93,15 @@ pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Resu
                 Habit::Grass => grass::segment(&cloud.points, up),
                 Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, up),
             };
-            Ok(Segmented { organs, up })
+            Ok(Segmented { organs: organs.into_iter().filter(is_fittable).collect(), up })
         }
     }
+}
+
+/// Geometry leaves scraps: a branch of a point or two, or of points that coincide. The main stem stays, whatever it is.
+fn is_fittable(organ: &OrganCloud) -> bool {
+    organ.kind == OrganKind::MainStem
+        || (organ.points.len() >= fit::MIN_POINTS && diagonal(&organ.points).is_some_and(|d| d > fit::MIN_EXTENT))
 }
 
 /// The points with these indices as an organ.
