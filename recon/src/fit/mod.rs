@@ -23,6 +23,9 @@ const FOOT_SHARE: f64 = 0.03;
 /// A blade of a species with petioles that starts farther than this share of its own extent from its parent gets a
 /// petiole of its own (a guess: nearer, the gap is the stem's thickness and a scan's raggedness).
 const BRIDGE_SHARE: f64 = 0.08;
+/// A leaflet that starts within this share of its own extent from the end of a petiole that was put in for another
+/// hangs on that petiole too (a guess: petiolules of soybean and tomato are shorter than half their leaflet).
+const PETIOLULE_SHARE: f64 = 0.5;
 /// Most leaflets that one leaf is taken to have when they hang on one petiole (soybean 3, tomato up to 9).
 const MAX_LEAFLETS: usize = 9;
 
@@ -122,6 +125,8 @@ struct Builder<'a> {
     organs: Vec<Organ>,
     fits: Vec<OrganFit>,
     hangers: Vec<Option<Hanger>>,
+    /// Petioles that were put in: their organ and their far end.
+    petioles: Vec<(usize, DVec3)>,
 }
 
 /// Fits a plant. `up` is the unit vertical of the points' frame.
@@ -133,7 +138,8 @@ pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, F
     let main = &tree.organs[0].points;
     let base = lowest(main, up);
     let world_from_plant = Pose::new(DQuat::from_rotation_arc(DVec3::Z, up), base);
-    let mut builder = Builder { species, up, organs: Vec::new(), fits: Vec::new(), hangers: Vec::new() };
+    let mut builder =
+        Builder { species, up, organs: Vec::new(), fits: Vec::new(), hangers: Vec::new(), petioles: Vec::new() };
     let fitted = stem::fit(main, base, species);
     let ground = Similarity { rotation: world_from_plant.rotation, translation: base, scale: 1.0 };
     builder.add_stem(None, 0.0, ground, &fitted, Some(0), main.len());
@@ -162,15 +168,39 @@ impl Builder<'_> {
             let fitted = stem::fit(points, base, self.species);
             return Ok(self.add_stem(Some(parent), d, joint, &fitted, Some(source), points.len()));
         }
-        let gap = foot.distance(base) - hanger.radius;
-        if self.species.habit != Habit::Grass && gap > BRIDGE_SHARE * extent(points) {
-            let radius = hanger.radius;
-            let mut bridge = stem::fit_path(&[base, foot], &[], self.species);
-            bridge.radius = self.species.ranges.stem_radius.clamp(radius / 2.0);
-            let petiole = self.add_stem(Some(parent), d, joint, &bridge, None, 0);
+        let apart = |base: DVec3, radius: f64| foot.distance(base) - radius > BRIDGE_SHARE * extent(points);
+        if self.species.habit == Habit::Grass || !apart(base, hanger.radius) {
+            return Ok(self.add_leaf(parent, d, source, points));
+        }
+        let Some(petiole) = self.shared_petiole(foot, extent(points)) else {
+            let petiole = self.bridge(parent, d, joint, foot, hanger.radius);
+            self.petioles.push((petiole, foot));
+            return Ok(self.add_leaf(petiole, 1.0, source, points));
+        };
+        let Some(hanger) = &self.hangers[petiole] else {
+            return Err(PlantError::LeafParent { organ: source, parent: petiole }.into());
+        };
+        let (base, frame) = hanger.at(1.0);
+        if !apart(base, hanger.radius) {
             return Ok(self.add_leaf(petiole, 1.0, source, points));
         }
-        Ok(self.add_leaf(parent, d, source, points))
+        let joint = Similarity { rotation: frame, translation: base, scale: hanger.similarity.scale };
+        let petiolule = self.bridge(petiole, 1.0, joint, foot, hanger.radius);
+        Ok(self.add_leaf(petiolule, 1.0, source, points))
+    }
+
+    /// Puts a straight stem, half as thick as its parent, from a joint to the foot of what hangs there.
+    fn bridge(&mut self, parent: usize, d: f64, joint: Similarity, foot: DVec3, radius: f64) -> usize {
+        let mut bridge = stem::fit_path(&[joint.translation, foot], &[], self.species);
+        bridge.radius = self.species.ranges.stem_radius.clamp(radius / 2.0);
+        self.add_stem(Some(parent), d, joint, &bridge, None, 0)
+    }
+
+    /// The petiole put in for another leaflet of the same leaf, the one that ends nearest to `foot`.
+    fn shared_petiole(&self, foot: DVec3, extent: f64) -> Option<usize> {
+        let near = self.petioles.iter().map(|(petiole, end)| (end.distance(foot), *petiole));
+        let near = near.filter(|(away, _)| self.species.habit == Habit::Compound && *away < PETIOLULE_SHARE * extent);
+        near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, petiole)| petiole)
     }
 
     fn add_stem(
