@@ -95,11 +95,10 @@ impl<'a> Data<'a> {
     fn first_guesses(&self, up: DVec3) -> [State; 2] {
         let path = resample(&course(&self.points, self.base, SLICES), ROWS);
         let chord = path[path.len() - 1] - path[0];
-        let widest = self.across(&path);
         let facing_up = |across: DVec3| if across.cross(chord).dot(up) < 0.0 { -across } else { across };
-        let flat = self.guess(&path, facing_up(widest));
+        let flat = self.guess(&path, facing_up(self.across(&path)));
         let other = if self.species.habit == Habit::Grass {
-            self.guess(&path, facing_up(widest.cross(chord.normalize_or_zero())))
+            self.guess(&path, facing_up(axes(path.iter().copied())[2]))
         } else {
             State { gamma: vec![0.0; flat.gamma.len()], ..flat.clone() }
         };
@@ -132,15 +131,7 @@ impl<'a> Data<'a> {
 
     /// The widest direction of the points about the course.
     fn across(&self, path: &[DVec3]) -> DVec3 {
-        let mut spread = nalgebra::Matrix3::zeros();
-        for p in &self.points {
-            let d = *p - nearest_of(path, *p);
-            let v = nalgebra::Vector3::new(d.x, d.y, d.z);
-            spread += v * v.transpose();
-        }
-        let eigen = spread.symmetric_eigen();
-        let v = eigen.eigenvectors.column(eigen.eigenvalues.imax());
-        DVec3::new(v[0], v[1], v[2])
+        axes(self.points.iter().map(|p| *p - nearest_of(path, *p)))[0]
     }
 
     fn posed(&self, state: &State, raw: &[DVec3]) -> Vec<DVec3> {
@@ -291,6 +282,22 @@ impl Pulls {
         }
         normal
     }
+}
+
+/// Principal axes of points about their mean, widest first.
+fn axes(points: impl Iterator<Item = DVec3> + Clone) -> [DVec3; 3] {
+    let count = points.clone().count().max(1) as f64;
+    let centre = points.clone().sum::<DVec3>() / count;
+    let mut spread = nalgebra::Matrix3::zeros();
+    for p in points {
+        let d = p - centre;
+        let v = nalgebra::Vector3::new(d.x, d.y, d.z);
+        spread += v * v.transpose();
+    }
+    let eigen = spread.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    order.map(|k| DVec3::from_array(std::array::from_fn(|i| eigen.eigenvectors[(i, k)])))
 }
 
 fn on_edge(n: usize) -> bool {

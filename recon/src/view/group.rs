@@ -26,6 +26,9 @@ const STAND_IN_LENGTH: f64 = 0.1;
 const NEAR_GROUND: f64 = 0.06;
 /// A stem stands upright when the vertical component of its axis is over this (45 degrees); only such a one is drawn on.
 const UPRIGHT: f64 = 0.7;
+/// A piece of main stem with less than this share of the largest one's pixels, and no continuation of another, is a scrap:
+/// the tip of a hanging blade, a dark edge. It roots no plant (a guess; plants in one picture are of a size).
+const SCRAP: f64 = 0.2;
 /// Share of points at either end of an organ that make its end.
 const END: f64 = 0.03;
 
@@ -56,6 +59,9 @@ pub enum GroupError {
     /// A main stem without a leaf.
     #[error("expected a leaf on the main stem, found none")]
     NoLeaf,
+    /// A scrap of main stem.
+    #[error("expected a main stem of about the size of the others in the picture, found a scrap")]
+    Scrap,
     /// No main stem, and too little to say where it would be.
     #[error("expected a main stem or at least two organs, found one organ")]
     NoMainStem,
@@ -79,16 +85,25 @@ pub struct Refused {
 pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Refused>) {
     let up = super::scale::up(view);
     let near: Vec<Near> = organs.iter().map(|organ| Near::new(&organ.cloud.points)).collect();
-    let mut plants: Vec<Vec<usize>> = main_stems(organs, &near);
+    let pixels = |stem: &Vec<usize>| stem.iter().map(|&i| organs[i].region.pixels).sum::<usize>() as f64;
+    let stems = main_stems(organs, &near);
+    let least = SCRAP * stems.iter().map(pixels).fold(0.0, f64::max);
+    let (mut plants, scraps): (Vec<_>, Vec<_>) = stems.into_iter().partition(|stem| pixels(stem) >= least);
     let loose = spread(organs, &near, &mut plants);
     let rooted = plants.len();
     plants.extend(loose_plants(&near, &loose));
 
-    let (mut views, mut refused) = (Vec::new(), Vec::new());
+    let ids = |members: &[usize]| {
+        let mut ids: Vec<u16> = members.iter().map(|&m| organs[m].region.id).collect();
+        ids.sort_unstable();
+        ids
+    };
+    let mut views = Vec::new();
+    let scrap = |stem: &Vec<usize>| Refused { instances: ids(stem), reason: GroupError::Scrap };
+    let mut refused: Vec<Refused> = scraps.iter().map(scrap).collect();
     for (i, members) in plants.into_iter().enumerate() {
         let leaves = members.iter().filter(|&&m| organs[m].cloud.kind == OrganKind::Leaf).count();
-        let mut instances: Vec<u16> = members.iter().map(|&m| organs[m].region.id).collect();
-        instances.sort_unstable();
+        let instances = ids(&members);
         if leaves == 0 {
             refused.push(Refused { instances, reason: GroupError::NoLeaf });
         } else if i >= rooted && members.len() < 2 {

@@ -1,6 +1,6 @@
 //! Organ instances of a picture from classes and boundary distance.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use demeter_frame::{Instances, Semantic};
 use image::ImageBuffer;
@@ -13,9 +13,9 @@ use crate::model::OrganKind;
 /// organ first, then the thin and the crowded. t saturates at 1 within δ = 1 % of the picture's diagonal, so 0.8 is 1.25
 /// δ and the last is everything (ours to tune, reconstruction.md "Points to organs").
 const LEVELS: [f32; 2] = [0.8, f32::INFINITY];
-/// A patch of main stem with less than this share of the largest one's pixels is the tip of a leaf that hangs like a
-/// stem, and counts as leaf (a guess; plants in one picture are of a size, and a plant without a stem gets one later).
-const MIN_STEM_SHARE: f64 = 0.2;
+/// A patch of main stem that touches one leaf and nothing else is that leaf's tip, hanging like a stem, when it has less
+/// than this share of the largest patch's pixels (a guess; plants in one picture are of a size).
+const TIP_SHARE: f64 = 0.5;
 /// Depth jumps from one organ to the next are told from the network's blur by this many times its median step.
 const BLUR_STEPS: f32 = 4.0;
 /// The smallest seed at 640 x 480, pixels: smaller ones are specks (a guess).
@@ -44,10 +44,9 @@ pub struct Region {
 /// become seeds themselves: a watershed of the boundary distance inside each class.
 #[must_use]
 pub fn instances(view: &View<'_>) -> (Instances, Vec<Region>) {
-    let mut class: Vec<u8> = view.semantic.as_raw().iter().map(|&c| if kind(c).is_some() { c } else { 0 }).collect();
+    let class: Vec<u8> = view.semantic.as_raw().iter().map(|&c| if kind(c).is_some() { c } else { 0 }).collect();
     let grid = Grid::of(view, &class);
     let min_seed = view.pixels(MIN_SEED);
-    grid.hanging_tips_to_leaf(&mut class);
 
     let (mut label, mut last) = (vec![0; class.len()], 0);
     for level in LEVELS {
@@ -59,6 +58,7 @@ pub fn instances(view: &View<'_>) -> (Instances, Vec<Region>) {
         let free: Vec<u8> = core.iter().zip(&label).map(|(&c, &l)| if l == 0 { c } else { 0 }).collect();
         last = grid.components(&free, min_seed, &mut label, last);
     }
+    let class = grid.tips_to_leaves(class, &mut label, last);
     grid.table(&class, &label, last)
 }
 
@@ -98,14 +98,19 @@ impl<'a> Grid<'a> {
         Self { width, height, log_depth, jump: slope.max(BLUR_STEPS * median) }
     }
 
-    /// The up to eight neighbours of pixel `p` that are not before or behind it: stems one pixel wide run diagonally.
-    fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> + use<'_, 'a> {
+    /// The up to eight neighbours of pixel `p`: stems one pixel wide run diagonally.
+    fn around(&self, p: usize) -> impl Iterator<Item = usize> + use<> {
         let (x, y, width, height) = (p % self.width, p / self.width, self.width, self.height);
-        let (log_depth, jump) = (self.log_depth, self.jump);
-        let apart = move |q: usize| (log_depth[q] - log_depth[p]).abs() > jump;
         let rows = y.saturating_sub(1)..(y + 2).min(height);
         rows.flat_map(move |j| (x.saturating_sub(1)..(x + 2).min(width)).map(move |i| j * width + i))
-            .filter(move |&q| q != p && !apart(q))
+            .filter(move |&q| q != p)
+    }
+
+    /// Those that are not before or behind it.
+    fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> + use<'_, 'a> {
+        let (log_depth, jump) = (self.log_depth, self.jump);
+        let apart = move |q: usize| (log_depth[q] - log_depth[p]).abs() > jump;
+        self.around(p).filter(move |&q| !apart(q))
     }
 
     /// Labels connected pixels of equal, non-zero `key`, at least `min` of them, from `last` + 1 on; gives the last.
@@ -137,21 +142,31 @@ impl<'a> Grid<'a> {
         last
     }
 
-    /// Gives patches of main stem that are too small for one to the leaves.
-    fn hanging_tips_to_leaf(&self, class: &mut [u8]) {
-        let main: Vec<u8> = class.iter().map(|&c| if c == MAIN { c } else { 0 }).collect();
-        let mut label = vec![0; class.len()];
-        let count = self.components(&main, 1, &mut label, 0);
-        let mut sizes = vec![0usize; count as usize + 1];
-        for &l in &label {
+    /// Gives patches of main stem that are the tips of leaves to those leaves; gives the classes after that.
+    fn tips_to_leaves(&self, mut class: Vec<u8>, label: &mut [u32], last: u32) -> Vec<u8> {
+        let count = last as usize + 1;
+        let (mut sizes, mut kind_of) = (vec![0usize; count], vec![0u8; count]);
+        let mut touched: Vec<BTreeSet<u32>> = vec![BTreeSet::new(); count];
+        for (p, &l) in label.iter().enumerate().filter(|&(_, &l)| l > 0) {
             sizes[l as usize] += 1;
-        }
-        let largest = sizes.iter().skip(1).copied().max().unwrap_or(0) as f64;
-        for (c, &l) in class.iter_mut().zip(&label) {
-            if l > 0 && (sizes[l as usize] as f64) < MIN_STEM_SHARE * largest {
-                *c = LEAF;
+            kind_of[l as usize] = class[p];
+            if class[p] == MAIN {
+                touched[l as usize].extend(self.around(p).map(|q| label[q]).filter(|&m| m != 0 && m != l));
             }
         }
+        let largest = (0..count).filter(|&l| kind_of[l] == MAIN).map(|l| sizes[l]).max().unwrap_or(0) as f64;
+        let leaf_of = |l: usize| match Vec::from_iter(&touched[l]).as_slice() {
+            &[&only] if (sizes[l] as f64) < TIP_SHARE * largest && kind_of[only as usize] == LEAF => Some(only),
+            _ => None,
+        };
+        let goes_to: Vec<Option<u32>> =
+            (0..count).map(|l| if kind_of[l] == MAIN { leaf_of(l) } else { None }).collect();
+        for (c, l) in class.iter_mut().zip(label) {
+            if let Some(leaf) = goes_to[*l as usize] {
+                (*c, *l) = (LEAF, leaf);
+            }
+        }
+        class
     }
 
     /// Gives every pixel that a label reaches inside its class the nearest one (breadth first, so in steps).
