@@ -38,6 +38,11 @@ impl Near {
         (self.low - other.high).max(other.low - self.high).max(DVec3::ZERO).length()
     }
 
+    /// Distance from a point to the cloud, infinite from none.
+    pub(super) fn distance(&self, p: DVec3) -> f64 {
+        self.tree.one(p).map_or(f64::INFINITY, |n| n.distance())
+    }
+
     /// The gap between two clouds: the 1st percentile of the distances from one's points to the other.
     pub(super) fn gap(&self, other: &Self) -> f64 {
         let mut distances: Vec<f64> =

@@ -109,7 +109,7 @@ pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Re
         } else if i >= rooted && members.len() < 2 {
             refused.push(Refused { instances, reason: GroupError::NoMainStem });
         } else {
-            views.push(plant(organs, &members, instances, up));
+            views.push(plant(view, organs, &members, instances, up));
         }
     }
     views.sort_by_key(|plant| (std::cmp::Reverse(plant.pixels), plant.instances[0]));
@@ -196,7 +196,7 @@ fn loose_plants(near: &[Near], loose: &[usize]) -> Vec<Vec<usize>> {
     clusters
 }
 
-fn plant(organs: &[LiftedOrgan], members: &[usize], instances: Vec<u16>, up: DVec3) -> PlantView {
+fn plant(view: &View<'_>, organs: &[LiftedOrgan], members: &[usize], instances: Vec<u16>, up: DVec3) -> PlantView {
     let height = |p: &DVec3| p.dot(up);
     let main: Vec<usize> = of_kind(organs, members, OrganKind::MainStem);
     // Without a main stem the stem that reaches lowest is taken for it.
@@ -216,11 +216,21 @@ fn plant(organs: &[LiftedOrgan], members: &[usize], instances: Vec<u16>, up: DVe
     let low = (0..stem.points.len()).min_by(|&a, &b| height(&stem.points[a]).total_cmp(&height(&stem.points[b])));
     let base = low.map_or(DVec3::ZERO, |i| stem.points[i]);
     let base_pixel = low.and_then(|i| stem.source.get(i).copied());
-    let mut rest: Vec<usize> = members.iter().copied().filter(|m| !pieces.contains(m)).collect();
+    let stems = of_kind(organs, members, OrganKind::Stem).into_iter().filter(|m| !pieces.contains(m));
+    let mut rest: Vec<Vec<usize>> =
+        stems.map(|stem| vec![stem]).chain(super::join::leaves(view, organs, members)).collect();
     rest.sort_unstable();
+    let cloud = |pieces: &Vec<usize>| {
+        let clouds = pieces.iter().map(|&piece| &organs[piece].cloud);
+        OrganCloud {
+            kind: organs[pieces[0]].cloud.kind,
+            points: clouds.clone().flat_map(|c| c.points.iter().copied()).collect(),
+            source: clouds.flat_map(|c| c.source.iter().copied()).collect(),
+        }
+    };
     let regions = members.iter().map(|&m| &organs[m].region);
     PlantView {
-        organs: std::iter::once(stem).chain(rest.iter().map(|&m| organs[m].cloud.clone())).collect(),
+        organs: std::iter::once(stem).chain(rest.iter().map(cloud)).collect(),
         instances,
         stand_in,
         base,

@@ -13,6 +13,7 @@ mod anchor;
 mod gap;
 mod group;
 mod instances2d;
+mod join;
 mod lift;
 mod overlay;
 mod scale;

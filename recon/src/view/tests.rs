@@ -146,6 +146,28 @@ fn a_stem_cut_by_a_leaf_is_one_and_a_lone_leaf_is_refused() {
 }
 
 #[test]
+fn a_strap_in_two_pieces_is_one_leaf_and_leaflets_side_by_side_are_not() {
+    use Semantic::{Leaf, MainStem};
+    let strap = Scene::new()
+        .rectangle(MainStem, [60, 60, 66, 220], 1.0)
+        .rectangle(Leaf, [66, 100, 130, 108], 1.0)
+        .rectangle(Leaf, [134, 100, 200, 108], 1.05);
+    let beside = Scene::new()
+        .rectangle(MainStem, [60, 60, 66, 220], 1.0)
+        .rectangle(Leaf, [66, 100, 100, 130], 1.0)
+        .rectangle(Leaf, [104, 100, 140, 130], 1.0);
+    for (scene, organs) in [(strap, 2), (beside, 3)] {
+        scene.with(None, |view| {
+            let (raster, regions) = instances(view);
+            assert_eq!(regions.len(), 3);
+            let lifted = lift(view, &raster, &regions, nominal(view).unwrap());
+            let (plants, refused) = group(view, &lifted.organs);
+            assert_eq!((plants.len(), refused.len(), plants[0].organs.len()), (1, 0, organs));
+        });
+    }
+}
+
+#[test]
 fn a_rosette_gets_a_stand_in_stem_between_its_leaves() {
     use Semantic::Leaf;
     let scene = Scene::new().rectangle(Leaf, [60, 100, 118, 120], 1.0).rectangle(Leaf, [122, 100, 180, 120], 1.0);
