@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::centreline::{angles_along, course, length, resample};
 use super::solver::{Normal, minimise};
 use super::stem::{clipped, mean, median};
-use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, gauge, node, vein_angle};
+use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, VEIN, gauge, node, vein_angle};
 use crate::model::{Habit, Species};
 use crate::nearest::{Nearest, Neighbour};
 
@@ -71,8 +71,9 @@ pub(super) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -
         minimise(&mut state, 15, |s| coarse.normal(s), |s, step| coarse.apply(s, step));
         (coarse.normal(&state).cost, state)
     };
-    let [first, second] = coarse.first_guesses(up).map(near);
-    let mut state = if second.0 < first.0 { second.1 } else { first.1 };
+    let nearest = |best: (f64, State), next: (f64, State)| if next.0 < best.0 { next } else { best };
+    let [first, second, third] = coarse.first_guesses(up).map(near);
+    let mut state = nearest(nearest(first, second), third).1;
     let converged = minimise(&mut state, 12, |s| fine.normal(s), |s, step| fine.apply(s, step));
     fine.finish(state, converged)
 }
@@ -88,21 +89,22 @@ impl<'a> Data<'a> {
         Self { base, points, tree, spacing, species }
     }
 
-    /// Two starts, for what one cannot tell from afar. Flat: the blade spreads as its points do and follows their
-    /// course. The other for grasses: turned by a quarter, because a strap that arches within the picture of a single
-    /// view has points that spread along the arch, and blades hardly bow within themselves. The other for broad blades:
-    /// straight, because the course through a folded blade is not its main vein's.
-    fn first_guesses(&self, up: DVec3) -> [State; 2] {
+    /// Three starts, for what one cannot tell from afar. Flat: the blade spreads as its points do and follows their
+    /// course. Turned by a quarter, and across the plane of the course: a strap that arches within the picture of a
+    /// single view has points that spread along the arch, and blades hardly bow within themselves. Broad blades start
+    /// straight instead of turned, because the course through a folded blade is not its main vein's.
+    fn first_guesses(&self, up: DVec3) -> [State; 3] {
         let path = resample(&course(&self.points, self.base, SLICES), ROWS);
         let chord = path[path.len() - 1] - path[0];
         let facing_up = |across: DVec3| if across.cross(chord).dot(up) < 0.0 { -across } else { across };
-        let flat = self.guess(&path, facing_up(self.across(&path)));
-        let other = if self.species.habit == Habit::Grass {
-            self.guess(&path, facing_up(axes(path.iter().copied())[2]))
+        let widest = self.across(&path);
+        let flat = self.guess(&path, facing_up(widest));
+        let second = if self.species.habit == Habit::Grass {
+            self.guess(&path, facing_up(widest.cross(chord.normalize_or_zero())))
         } else {
             State { gamma: vec![0.0; flat.gamma.len()], ..flat.clone() }
         };
-        [flat, other]
+        [flat, second, self.guess(&path, facing_up(axes(path.iter().copied())[2]))]
     }
 
     fn guess(&self, path: &[DVec3], across: DVec3) -> State {
@@ -120,13 +122,18 @@ impl<'a> Data<'a> {
         let flat = self.species.leaf.flat(&[], 1.0);
         let typical = mean(flat.iter().map(|p| p.x.abs())) * metres;
         let width = self.species.ranges.blade_width.clamp(mean(half_widths.iter().copied()) / typical.max(1e-9));
-        State {
+        let mut state = State {
             rotation,
             log_length: metres.ln(),
             log_width: width.ln(),
             beta: vec![0.0; self.species.leaf.shape.rank()],
             gamma: clipped(self.species.leaf.deform.project(&angles)),
-        }
+        };
+        // The basis does not hold every bend, so the vein that is left of the course's angles is turned onto the course.
+        let raw = self.species.leaf.jacobian(&state.blade()).points;
+        let vein = path.iter().enumerate().map(|(i, p)| (*p - self.base, raw[node(i, VEIN)] * metres));
+        state.rotation = turn_onto(vein.chain([(x * metres, DVec3::X * metres)])).unwrap_or(rotation);
+        state
     }
 
     /// The widest direction of the points about the course.
@@ -282,6 +289,20 @@ impl Pulls {
         }
         normal
     }
+}
+
+/// The rotation that takes each second point nearest to its first (Kabsch); `None` when the points do not tell.
+fn turn_onto(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Option<DQuat> {
+    let vector = |p: DVec3| nalgebra::Vector3::new(p.x, p.y, p.z);
+    let product: nalgebra::Matrix3<f64> = pairs.map(|(to, from)| vector(to) * vector(from).transpose()).sum();
+    let svd = product.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let mut keep = nalgebra::Matrix3::identity();
+    keep[(2, 2)] = (u * v_t).determinant().signum();
+    let rotation = u * keep * v_t;
+    let column = |k: usize| DVec3::new(rotation[(0, k)], rotation[(1, k)], rotation[(2, k)]);
+    let turn = DQuat::from_mat3(&DMat3::from_cols(column(0), column(1), column(2))).normalize();
+    turn.is_finite().then_some(turn)
 }
 
 /// Principal axes of points about their mean, widest first.
