@@ -4,6 +4,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::centreline::{angles_along, course, length, resample};
+use super::orient::{axes, turn_onto};
 use super::solver::{Normal, minimise};
 use super::stem::{clipped, mean, median};
 use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, VEIN, gauge, node, vein_angle};
@@ -289,36 +290,6 @@ impl Pulls {
         }
         normal
     }
-}
-
-/// The rotation that takes each second point nearest to its first (Kabsch); `None` when the points do not tell.
-fn turn_onto(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Option<DQuat> {
-    let vector = |p: DVec3| nalgebra::Vector3::new(p.x, p.y, p.z);
-    let product: nalgebra::Matrix3<f64> = pairs.map(|(to, from)| vector(to) * vector(from).transpose()).sum();
-    let svd = product.svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let mut keep = nalgebra::Matrix3::identity();
-    keep[(2, 2)] = (u * v_t).determinant().signum();
-    let rotation = u * keep * v_t;
-    let column = |k: usize| DVec3::new(rotation[(0, k)], rotation[(1, k)], rotation[(2, k)]);
-    let turn = DQuat::from_mat3(&DMat3::from_cols(column(0), column(1), column(2))).normalize();
-    turn.is_finite().then_some(turn)
-}
-
-/// Principal axes of points about their mean, widest first.
-fn axes(points: impl Iterator<Item = DVec3> + Clone) -> [DVec3; 3] {
-    let count = points.clone().count().max(1) as f64;
-    let centre = points.clone().sum::<DVec3>() / count;
-    let mut spread = nalgebra::Matrix3::zeros();
-    for p in points {
-        let d = p - centre;
-        let v = nalgebra::Vector3::new(d.x, d.y, d.z);
-        spread += v * v.transpose();
-    }
-    let eigen = spread.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    order.map(|k| DVec3::from_array(std::array::from_fn(|i| eigen.eigenvectors[(i, k)])))
 }
 
 fn on_edge(n: usize) -> bool {

@@ -5,6 +5,7 @@
 
 mod centreline;
 mod leaf;
+mod orient;
 mod solver;
 mod stem;
 

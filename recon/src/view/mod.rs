@@ -102,3 +102,5 @@ impl View<'_> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tracking_tests;
