@@ -10,6 +10,7 @@ pub mod export;
 pub mod fit;
 pub mod graph;
 pub mod import;
+pub mod learn;
 pub mod metrics;
 pub mod model;
 pub mod nearest;
