@@ -47,6 +47,7 @@ pub fn describe(
         organ.residual = fit.residual;
         organ.visible_fraction = fit.visible_fraction;
     }
+    report.warnings.extend(fitted.dropped.iter().map(|reason| format!("left out {reason}")));
     Ok(Described { record, plant, mesh, report })
 }
 

@@ -5,6 +5,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod axes;
 pub mod cloud;
 pub mod export;
 pub mod fit;

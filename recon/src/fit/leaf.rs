@@ -4,9 +4,10 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::centreline::{angles_along, course, length, resample};
-use super::orient::{axes, turn_onto};
+use super::orient::turn_onto;
 use super::solver::{Normal, minimise};
 use super::stem::{clipped, mean, median};
+use crate::axes::PrincipalAxes;
 use crate::model::leaf::{ANGLES, Blade, BladeJacobian, COLUMNS, POINTS, ROWS, VEIN, gauge, node, vein_angle};
 use crate::model::{Habit, Species};
 use crate::nearest::{Nearest, Neighbour};
@@ -105,7 +106,7 @@ impl<'a> Data<'a> {
         } else {
             State { gamma: vec![0.0; flat.gamma.len()], ..flat.clone() }
         };
-        [flat, second, self.guess(&path, facing_up(axes(path.iter().copied())[2]))]
+        [flat, second, self.guess(&path, facing_up(PrincipalAxes::of(path.iter().copied()).axes.z_axis))]
     }
 
     fn guess(&self, path: &[DVec3], across: DVec3) -> State {
@@ -139,7 +140,7 @@ impl<'a> Data<'a> {
 
     /// The widest direction of the points about the course.
     fn across(&self, path: &[DVec3]) -> DVec3 {
-        axes(self.points.iter().map(|p| *p - nearest_of(path, *p)))[0]
+        PrincipalAxes::of(self.points.iter().map(|p| *p - nearest_of(path, *p))).axes.x_axis
     }
 
     fn posed(&self, state: &State, raw: &[DVec3]) -> Vec<DVec3> {

@@ -16,19 +16,3 @@ pub(super) fn turn_onto(pairs: impl Iterator<Item = (DVec3, DVec3)>) -> Option<D
     let turn = DQuat::from_mat3(&DMat3::from_cols(column(0), column(1), column(2))).normalize();
     turn.is_finite().then_some(turn)
 }
-
-/// Principal axes of points about their mean, widest first.
-pub(super) fn axes(points: impl Iterator<Item = DVec3> + Clone) -> [DVec3; 3] {
-    let count = points.clone().count().max(1) as f64;
-    let centre = points.clone().sum::<DVec3>() / count;
-    let mut spread = Matrix3::zeros();
-    for p in points {
-        let d = p - centre;
-        let v = Vector3::new(d.x, d.y, d.z);
-        spread += v * v.transpose();
-    }
-    let eigen = spread.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    order.map(|k| DVec3::from_array(std::array::from_fn(|i| eigen.eigenvectors[(i, k)])))
-}

@@ -68,7 +68,7 @@ pub struct Plant {
 }
 
 /// What makes a set of organs no plant; every variant names the organ.
-#[derive(Debug, thiserror::Error, PartialEq)]
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
 pub enum PlantError {
     /// No organ at all.
     #[error("a plant needs a main stem, found no organ")]

@@ -2,9 +2,9 @@
 //! agreeing normals, stems are taken apart along their skeleton.
 
 use glam::DVec3;
-use nalgebra::Matrix3;
 
 use super::{MIN_ORGAN_POINTS, grain, ground_point, organ, split_stems};
+use crate::axes::PrincipalAxes;
 use crate::graph::{CloudGraph, pieces, prune, skeleton};
 use crate::model::OrganKind;
 use crate::nearest::Nearest;
@@ -78,24 +78,8 @@ fn neighbourhood(points: &[DVec3], search: &Nearest, p: DVec3, radius: f64) -> N
     if found.len() < 8 {
         found = search.k(p, 8);
     }
-    let n = found.len().max(1) as f64;
-    let centre = found.iter().map(|f| points[f.index]).sum::<DVec3>() / n;
-    let mut spread = Matrix3::zeros();
-    for f in &found {
-        let d = points[f.index] - centre;
-        let v = nalgebra::Vector3::new(d.x, d.y, d.z);
-        spread += v * v.transpose() / n;
-    }
-    let eigen = spread.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let sd = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
-    let normal = eigen.eigenvectors.column(order[2]);
-    Neighbourhood {
-        flatness: sd[1] / sd[0].max(1e-12),
-        thickness: sd[2] / sd[1].max(1e-12),
-        normal: DVec3::new(normal[0], normal[1], normal[2]),
-    }
+    let PrincipalAxes { axes, deviation: sd, .. } = PrincipalAxes::of(found.iter().map(|f| points[f.index]));
+    Neighbourhood { flatness: sd[1] / sd[0].max(1e-12), thickness: sd[2] / sd[1].max(1e-12), normal: axes.z_axis }
 }
 
 /// Takes apart blades that touch at their bases: seen along the cluster from where it meets its stem, each is a path

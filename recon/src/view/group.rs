@@ -3,8 +3,8 @@
 use glam::{DVec2, DVec3};
 
 use super::gap::Near;
-use super::lift::principal_axes;
 use super::{LiftedOrgan, View};
+use crate::axes::PrincipalAxes;
 use crate::model::OrganKind;
 use crate::organs::OrganCloud;
 
@@ -125,7 +125,7 @@ fn main_stems(organs: &[LiftedOrgan], near: &[Near]) -> Vec<Vec<usize>> {
         let continues = |stem: &&mut Vec<usize>| {
             let longest = stem[0];
             let length = near[longest].size();
-            let (centre, axes) = principal_axes(&organs[longest].cloud.points);
+            let PrincipalAxes { centre, axes, .. } = PrincipalAxes::of(organs[longest].cloud.points.iter().copied());
             let points = &organs[piece].cloud.points;
             let off = |p: &DVec3| (*p - centre).reject_from(axes.x_axis).length();
             let aside = points.iter().map(off).sum::<f64>() / points.len() as f64;
@@ -266,7 +266,7 @@ fn stand_in_stem(organs: &[LiftedOrgan], members: &[usize], up: DVec3) -> Vec<DV
 
 /// The middle of the end, along the longest axis, that is nearer to `target`.
 fn nearer_end(points: &[DVec3], target: DVec3) -> DVec3 {
-    let (centre, axes) = principal_axes(points);
+    let PrincipalAxes { centre, axes, .. } = PrincipalAxes::of(points.iter().copied());
     let mut sorted: Vec<DVec3> = points.to_vec();
     sorted.sort_by(|a, b| (*a - centre).dot(axes.x_axis).total_cmp(&(*b - centre).dot(axes.x_axis)));
     let few = ((points.len() as f64 * END) as usize).max(1);
@@ -289,7 +289,7 @@ impl PlantView {
             (depth > 0.0 && near_ground).then(|| (pose.translation + ray * depth).truncate())
         });
         hit.unwrap_or_else(|| {
-            let axis = principal_axes(&self.organs[0].points).1.x_axis;
+            let axis = PrincipalAxes::of(self.organs[0].points.iter().copied()).axes.x_axis;
             let upright = axis.z.abs() > UPRIGHT;
             (self.base - if upright { axis * (self.base.z / axis.z) } else { DVec3::ZERO }).truncate()
         })

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::gap::Near;
-use super::lift::principal_axes;
 use super::{LiftedOrgan, View};
+use crate::axes::PrincipalAxes;
 use crate::model::OrganKind;
 
 /// A leaf reaches the stem when the gap in the picture is at most this share of its size there (a guess).
@@ -62,13 +62,12 @@ pub(super) fn leaves(view: &View<'_>, organs: &[LiftedOrgan], members: &[usize])
 impl Piece {
     fn of(organ: usize, pixels: &[DVec3], stem: &Near) -> Self {
         let near = Near::new(pixels);
-        let (middle, axes) = principal_axes(pixels);
-        let spread = |axis: DVec3| pixels.iter().map(|p| (*p - middle).dot(axis).powi(2)).sum::<f64>().sqrt();
+        let PrincipalAxes { centre: middle, deviation, .. } = PrincipalAxes::of(pixels.iter().copied());
         let mut far: Vec<(f64, DVec3)> = pixels.iter().map(|p| (stem.distance(*p), *p)).collect();
         far.sort_by(|a, b| b.0.total_cmp(&a.0));
         far.truncate(((pixels.len() as f64 * END) as usize).max(1));
         let tip = far.iter().map(|(_, p)| *p).sum::<DVec3>() / far.len().max(1) as f64;
-        let is_strap = spread(axes.x_axis) > STRAP * spread(axes.y_axis);
+        let is_strap = deviation[0] > STRAP * deviation[1];
         Self { organ, gap: stem.gap(&near), near, middle, tip, is_strap }
     }
 

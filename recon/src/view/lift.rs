@@ -1,10 +1,10 @@
 //! Organ instances of a picture into space.
 
 use demeter_frame::{Instances, Pose};
-use glam::{DMat3, DVec2, DVec3};
-use nalgebra::{Matrix3, SymmetricEigen};
+use glam::{DVec2, DVec3};
 
 use super::{DepthScale, Region, View};
+use crate::axes::PrincipalAxes;
 use crate::model::OrganKind;
 use crate::organs::OrganCloud;
 
@@ -165,7 +165,7 @@ fn implausible(points: &[DVec3]) -> Option<(DropReason, f64)> {
 
 /// Sides of the box along the principal axes that holds all but 2 % of the points at either end, longest first.
 fn box_sides(points: &[DVec3]) -> [f64; 3] {
-    let (centre, axes) = principal_axes(points);
+    let PrincipalAxes { centre, axes, .. } = PrincipalAxes::of(points.iter().copied());
     let mut sides = [0, 1, 2].map(|k| {
         let mut along: Vec<f64> = points.iter().map(|p| (*p - centre).dot(axes.col(k))).collect();
         along.sort_by(f64::total_cmp);
@@ -173,19 +173,4 @@ fn box_sides(points: &[DVec3]) -> [f64; 3] {
     });
     sides.sort_by(|a, b| b.total_cmp(a));
     sides
-}
-
-/// Mean and principal axes (columns, longest spread first) of at least one point.
-pub(super) fn principal_axes(points: &[DVec3]) -> (DVec3, DMat3) {
-    let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-    let mut covariance = Matrix3::zeros();
-    for p in points {
-        let d = (*p - centre).to_array();
-        covariance += Matrix3::from_fn(|i, j| d[i] * d[j]);
-    }
-    let eigen = SymmetricEigen::new(covariance);
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let axis = |k: usize| DVec3::from_array(std::array::from_fn(|i| eigen.eigenvectors[(i, order[k])]));
-    (centre, DMat3::from_cols(axis(0), axis(1), axis(2)))
 }

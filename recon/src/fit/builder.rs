@@ -1,0 +1,146 @@
+//! The growing plant of stage 1: each organ fitted alone and hung on the stem it grows from.
+
+use glam::DVec3;
+
+use super::hanger::{Hanger, relative};
+use super::stem::StemFit;
+use super::{FitError, OrganFit, leaf, stem};
+use crate::cloud::diagonal;
+use crate::model::kinematics::Similarity;
+use crate::model::{Form, Habit, Joint, Organ, OrganKind, PlantError, Species};
+
+/// A blade of a species with petioles that starts farther than this share of its own extent from its parent gets a
+/// petiole of its own (a guess: nearer, the gap is the stem's thickness and a scan's raggedness).
+const BRIDGE_SHARE: f64 = 0.08;
+/// A leaflet that starts within this share of its own extent from the end of a petiole that was put in for another
+/// hangs on that petiole too (a guess: petiolules of soybean and tomato are shorter than half their leaflet).
+const PETIOLULE_SHARE: f64 = 0.5;
+
+/// The growing plant.
+pub(super) struct Builder<'a> {
+    species: &'a Species,
+    up: DVec3,
+    pub organs: Vec<Organ>,
+    pub fits: Vec<OrganFit>,
+    /// The stem that each organ is, `None` for blades.
+    hangers: Vec<Option<Hanger>>,
+    /// Petioles that were put in: their organ and their far end.
+    petioles: Vec<(usize, DVec3)>,
+}
+
+/// The data of one organ.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    /// Index in the organ tree.
+    pub organ: usize,
+    pub kind: OrganKind,
+    /// Metres; at least three with an extent.
+    pub points: &'a [DVec3],
+}
+
+impl<'a> Builder<'a> {
+    /// A plant of its main stem alone, which starts at `ground`.
+    pub(super) fn new(main: Source<'_>, ground: Similarity, species: &'a Species, up: DVec3) -> Self {
+        let mut builder =
+            Self { species, up, organs: Vec::new(), fits: Vec::new(), hangers: Vec::new(), petioles: Vec::new() };
+        let fit = stem::fit(main.points, ground.translation, species);
+        builder.add_stem(None, 0.0, ground, &fit, Some(main));
+        builder
+    }
+
+    /// Hangs an organ on a stem of the plant, over a petiole where one must have been; gives its index.
+    pub(super) fn hang(&mut self, parent: usize, source: Source<'_>) -> Result<usize, FitError> {
+        let hanger = self.hanger(parent, source)?;
+        let foot = hanger.foot(source.points);
+        let d = hanger.nearest(foot);
+        let joint = hanger.joint(d);
+        if source.kind != OrganKind::Leaf {
+            let fit = stem::fit(source.points, joint.translation, self.species);
+            return Ok(self.add_stem(Some(parent), d, joint, &fit, Some(source)));
+        }
+        let size = diagonal(source.points).unwrap_or(0.0);
+        let radius = hanger.radius;
+        let apart = |joint: Similarity, radius: f64| foot.distance(joint.translation) - radius > BRIDGE_SHARE * size;
+        if self.species.habit == Habit::Grass || !apart(joint, radius) {
+            return Ok(self.add_leaf(parent, d, joint, source));
+        }
+        let Some(petiole) = self.shared_petiole(foot, size) else {
+            let petiole = self.bridge(parent, d, joint, foot, radius);
+            self.petioles.push((petiole, foot));
+            return self.add_leaf_at_end(petiole, source);
+        };
+        let hanger = self.hanger(petiole, source)?;
+        let (end, radius) = (hanger.joint(1.0), hanger.radius);
+        if !apart(end, radius) {
+            return Ok(self.add_leaf(petiole, 1.0, end, source));
+        }
+        let petiolule = self.bridge(petiole, 1.0, end, foot, radius);
+        self.add_leaf_at_end(petiolule, source)
+    }
+
+    fn hanger(&self, parent: usize, source: Source<'_>) -> Result<&Hanger, FitError> {
+        let missing = PlantError::LeafParent { organ: source.organ, parent };
+        Ok(self.hangers[parent].as_ref().ok_or(missing)?)
+    }
+
+    /// Puts a straight stem, half as thick as its parent, from a joint to the foot of what hangs there.
+    fn bridge(&mut self, parent: usize, d: f64, joint: Similarity, foot: DVec3, radius: f64) -> usize {
+        let mut bridge = stem::fit_path(&[joint.translation, foot], &[], self.species);
+        bridge.radius = self.species.ranges.stem_radius.clamp(radius / 2.0);
+        self.add_stem(Some(parent), d, joint, &bridge, None)
+    }
+
+    /// The petiole put in for another leaflet of the same leaf, the one that ends nearest to `foot`.
+    fn shared_petiole(&self, foot: DVec3, size: f64) -> Option<usize> {
+        let near = self.petioles.iter().map(|(petiole, end)| (end.distance(foot), *petiole));
+        let near = near.filter(|(away, _)| self.species.habit == Habit::Compound && *away < PETIOLULE_SHARE * size);
+        near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, petiole)| petiole)
+    }
+
+    fn add_stem(
+        &mut self,
+        parent: Option<usize>,
+        d: f64,
+        joint: Similarity,
+        fit: &StemFit,
+        source: Option<Source<'_>>,
+    ) -> usize {
+        self.hangers.push(Some(Hanger::of(fit, joint.translation, self.species)));
+        self.organs.push(Organ {
+            parent,
+            joint: Joint { d, rotation: relative(joint.rotation, fit.rotation), scale: fit.length / joint.scale },
+            form: Form::Stem { gamma: fit.gamma.clone(), radius: fit.radius / fit.length },
+        });
+        self.fits.push(OrganFit {
+            source: source.map(|s| s.organ),
+            points: source.map_or(0, |s| s.points.len()),
+            residual: source.map(|_| fit.residual),
+            visible_fraction: None,
+            converged: fit.converged,
+        });
+        self.organs.len() - 1
+    }
+
+    fn add_leaf_at_end(&mut self, parent: usize, source: Source<'_>) -> Result<usize, FitError> {
+        let joint = self.hanger(parent, source)?.joint(1.0);
+        Ok(self.add_leaf(parent, 1.0, joint, source))
+    }
+
+    fn add_leaf(&mut self, parent: usize, d: f64, joint: Similarity, source: Source<'_>) -> usize {
+        let fit = leaf::fit(source.points, joint.translation, self.up, self.species);
+        self.hangers.push(None);
+        self.organs.push(Organ {
+            parent: Some(parent),
+            joint: Joint { d, rotation: relative(joint.rotation, fit.rotation), scale: fit.length / joint.scale },
+            form: Form::Leaf { blade: fit.blade, leaf: 0 },
+        });
+        self.fits.push(OrganFit {
+            source: Some(source.organ),
+            points: source.points.len(),
+            residual: Some(fit.residual),
+            visible_fraction: Some(fit.visible),
+            converged: fit.converged,
+        });
+        self.organs.len() - 1
+    }
+}

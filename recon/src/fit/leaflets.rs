@@ -1,0 +1,37 @@
+//! Leaflets to leaves.
+
+use std::collections::BTreeMap;
+
+use crate::model::{Form, Habit, Organ, OrganKind};
+
+/// Most leaflets that one leaf is taken to have when they hang on one petiole (soybean 3, tomato up to 9).
+const MAX_LEAFLETS: usize = 9;
+
+/// Numbers the leaves: leaflets on one petiole make one leaf.
+pub(super) fn group(organs: &mut [Organ], habit: Habit) {
+    // The stem next to the main stem that carries each organ: its petiole, or its branch.
+    let mut petiole: Vec<Option<usize>> = Vec::with_capacity(organs.len());
+    for (i, organ) in organs.iter().enumerate() {
+        petiole.push(match organ.parent {
+            Some(parent) if parent > 0 => petiole[parent],
+            Some(_) if organ.kind() == OrganKind::Stem => Some(i),
+            _ => None,
+        });
+    }
+    let mut blades = vec![0; organs.len()];
+    for (petiole, organ) in petiole.iter().zip(&*organs) {
+        if let (Some(petiole), OrganKind::Leaf) = (petiole, organ.kind()) {
+            blades[*petiole] += 1;
+        }
+    }
+    let shared = |petiole: usize| habit == Habit::Compound && blades[petiole] <= MAX_LEAFLETS;
+    let mut number_of: BTreeMap<usize, u16> = BTreeMap::new();
+    let mut next = 0;
+    for (i, organ) in organs.iter_mut().enumerate() {
+        if let Form::Leaf { leaf, .. } = &mut organ.form {
+            // A leaf goes by its petiole, or by its one blade.
+            *leaf = *number_of.entry(petiole[i].filter(|p| shared(*p)).unwrap_or(i)).or_insert(next);
+            next = next.max(*leaf + 1);
+        }
+    }
+}
