@@ -11,6 +11,7 @@ pub mod kinematics;
 pub mod leaf;
 pub mod mesh;
 pub mod plant;
+mod priors;
 pub mod species;
 pub mod stem;
 
@@ -19,4 +20,5 @@ pub use catmull_rom::{Knots, refine};
 pub use kinematics::{PosedPlant, Similarity, forward};
 pub use mesh::{Detail, PlantMesh};
 pub use plant::{Form, Joint, Organ, OrganKind, Plant, PlantError};
+pub use priors::{JointPrior, Normal, Priors};
 pub use species::{Habit, Range, Ranges, Species};

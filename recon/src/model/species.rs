@@ -1,4 +1,4 @@
-//! Everything a species knows, in one file: template, bases, ranges, provenance.
+//! Everything a species knows, in one file: template, bases, ranges, priors, provenance.
 
 use std::collections::BTreeMap;
 
@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::basis::{Basis, BasisError};
 use super::leaf::{self, LeafModel};
+use super::priors::Priors;
 use super::stem::{self, StemModel};
 
 /// A plausible range, in the unit of its field.
@@ -75,6 +76,8 @@ pub struct Species {
     pub habit: Habit,
     /// Plausible sizes.
     pub ranges: Ranges,
+    /// How its organs usually hang.
+    pub priors: Priors,
     /// Where the bases come from: data, licence, command.
     pub provenance: String,
     /// Its leaves.
@@ -123,15 +126,15 @@ struct Header {
     name: String,
     habit: Habit,
     ranges: Ranges,
+    priors: Priors,
     provenance: String,
 }
 
 /// Name and version of the file's layout.
-const FORMAT: &str = "demeter-species 1";
+const FORMAT: &str = "demeter-species 2";
 
 impl Species {
-    /// A species from its parts; numbers are rounded to f32 as the file keeps them, so that a species in memory and
-    /// the same one read back are equal.
+    /// A species from its parts, with priors that say nothing.
     ///
     /// # Errors
     /// [`SpeciesError`] when sizes or bases are wrong.
@@ -143,9 +146,18 @@ impl Species {
         leaf: &LeafModel,
         stem: &StemModel,
     ) -> Result<Self, SpeciesError> {
-        let (name, provenance) = (name.into(), provenance.into());
-        let header = Header { format: FORMAT.into(), name, habit, ranges, provenance };
-        Self::from_bytes(&to_bytes(&header, leaf, stem)?)
+        let (name, provenance, leaf, stem) = (name.into(), provenance.into(), leaf.clone(), stem.clone());
+        let priors = Priors::UNKNOWN;
+        Self { name, habit, ranges, priors, provenance, leaf, stem, hash: String::new() }.sealed()
+    }
+
+    /// The species checked and hashed anew after a part was changed. Numbers are rounded to f32 as the file keeps
+    /// them, so that a species in memory and the same one read back are equal.
+    ///
+    /// # Errors
+    /// [`SpeciesError`] naming what is wrong.
+    pub fn sealed(self) -> Result<Self, SpeciesError> {
+        Self::from_bytes(&self.to_bytes()?)
     }
 
     /// Reads a species file: safetensors with tensors `leaf.shape.{mean,components,sigma}`,
@@ -162,6 +174,9 @@ impl Species {
         if header.format != FORMAT {
             return Err(bad("format", FORMAT, header.format));
         }
+        if !header.priors.is_valid() {
+            return Err(bad("priors", "finite means and standard deviations above 0", format!("{:?}", header.priors)));
+        }
         let tensors = SafeTensors::deserialize(bytes)?;
         let leaf = LeafModel {
             shape: read_basis(&tensors, "leaf.shape", leaf::POINTS * 2)?,
@@ -172,6 +187,7 @@ impl Species {
             name: header.name,
             habit: header.habit,
             ranges: header.ranges,
+            priors: header.priors,
             provenance: header.provenance,
             leaf,
             stem,
@@ -189,6 +205,7 @@ impl Species {
             name: self.name.clone(),
             habit: self.habit,
             ranges: self.ranges,
+            priors: self.priors,
             provenance: self.provenance.clone(),
         };
         to_bytes(&header, &self.leaf, &self.stem)

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use rand::Rng;
 
 use super::Seeded;
-use super::sprout::{Sprout, blade_frame, coefficients, normal, stem_frame};
+use super::sprout::{Sprout, bent_stem, blade_frame, coefficients, drooping_blade, normal, scattered, stem_frame};
 use crate::model::leaf::Blade;
 use crate::model::{Plant, Species};
 
@@ -17,7 +17,7 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
     let height = (0.09 + 1.75 * age.powf(1.25)) * (0.12 * normal(rng)).exp();
     let radius = (0.004 + 0.008 * age) * (0.12 * normal(rng)).exp();
     let lean = stem_frame(rng.random_range(0.0..2.0 * PI), 0.05 * normal(rng).abs());
-    let gamma = coefficients(rng, species.stem.deform.rank(), 0.15 + 0.1 * age);
+    let gamma = scattered(rng, bent_stem(species, 0.0), 0.15 + 0.1 * age);
     let stalk = sprout.stem(None, lean, height, radius, gamma);
 
     // The longest blade stands at two thirds of the height (Kiesselbach); 30 cm on a seedling, near 1 m later.
@@ -36,9 +36,9 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
         let length = longest * profile * (0.08 * normal(rng)).exp();
         // Leaf angles from the stalk: 15 degrees in the whorl to 50 below (guess within the published 10 to 60).
         let tilt = (0.85 - 0.6 * up + 0.08 * lax + 0.1 * normal(rng)).clamp(0.08, 1.3);
-        let mut gamma = coefficients(rng, species.leaf.deform.rank(), 1.0);
-        // Long unfolded blades arch over by a right angle or more, the whorl's stand; γ_0 is the total turn.
-        gamma[0] = (2.5 - 2.0 * up + 0.5 * lax + 0.5 * gamma[0]).clamp(-0.3, 3.0);
+        // Long unfolded blades arch over by a right angle or more, the whorl's stand; the law in radians is a guess.
+        let turn = (2.4 - 1.9 * up + 0.5 * lax + 0.5 * normal(rng)).clamp(-0.3, 2.9);
+        let gamma = scattered(rng, drooping_blade(species, turn), 0.6);
         let blade = Blade {
             beta: coefficients(rng, species.leaf.shape.rank(), 0.8),
             gamma,

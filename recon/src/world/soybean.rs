@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use rand::Rng;
 
 use super::Seeded;
-use super::sprout::{Sprout, blade_frame, coefficients, normal, stem_frame};
+use super::sprout::{Sprout, bent_stem, blade_frame, coefficients, drooping_blade, normal, scattered, stem_frame};
 use crate::model::leaf::Blade;
 use crate::model::{Habit, Plant, Species};
 
@@ -18,7 +18,7 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
     let height = (0.09 + 0.055 * (nodes as f64 - 1.0)) * (0.15 * normal(rng)).exp();
     let radius = (0.0014 + 0.0030 * age) * (0.12 * normal(rng)).exp();
     let lean = stem_frame(rng.random_range(0.0..2.0 * PI), 0.07 * normal(rng).abs());
-    let main = sprout.stem(None, lean, height, radius, stem_bends(species, rng, 0.3));
+    let main = sprout.stem(None, lean, height, radius, scattered(rng, bent_stem(species, 0.0), 0.3));
     let mut grower = Grower { species, age, leaf: 0 };
     let mut azimuth = rng.random_range(0.0..2.0 * PI);
     for i in 0..nodes {
@@ -33,8 +33,8 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
         if age > 0.5 && i < 4 && rng.random::<f64>() < age - 0.4 {
             let length = height * rng.random_range(0.3..0.6);
             let base = stem_frame(azimuth + 0.3 * normal(rng), rng.random_range(0.5..0.9));
-            let mut gamma = stem_bends(species, rng, 0.4);
-            gamma[0] = -1.0 + 0.4 * normal(rng);
+            // Branches bend upwards.
+            let gamma = scattered(rng, bent_stem(species, -0.5), 0.4);
             let branch = sprout.stem(Some((main, d)), base, length, radius * 0.6, gamma);
             for k in 0..rng.random_range(2..5u32) {
                 let side = azimuth + 0.5 * PI + PI * f64::from(k % 2) + 0.4 * normal(rng);
@@ -60,8 +60,7 @@ impl Grower<'_> {
         let leaflet_length = (0.055 + 0.065 * self.age) * size.sqrt() * (0.1 * normal(rng)).exp();
         let petiole_radius = (0.0009 + 0.0008 * self.age) * size.sqrt();
         let tilt = (0.85 + 0.18 * normal(rng)).clamp(0.3, 1.3);
-        let mut gamma = stem_bends(self.species, rng, 0.4);
-        gamma[0] += 0.4;
+        let gamma = scattered(rng, bent_stem(self.species, 0.2), 0.4);
         let petiole = sprout.stem(Some(seat), stem_frame(azimuth, tilt), petiole_length, petiole_radius, gamma);
         // Pulvini turn leaflets towards the light: near horizontal, hanging a little, each at will (guess).
         let droop = 0.5 * PI + 0.2 + 0.2 * normal(rng);
@@ -77,7 +76,7 @@ impl Grower<'_> {
             }
             let rachis_length = leaflet_length * rng.random_range(0.2..0.35);
             let base = stem_frame(azimuth, 0.5 * (tilt + 0.5 * PI));
-            let gamma = stem_bends(self.species, rng, 0.3);
+            let gamma = scattered(rng, bent_stem(self.species, 0.0), 0.3);
             end = (sprout.stem(Some(end), base, rachis_length, petiole_radius * 0.8, gamma), 1.0);
         }
         let base = blade_frame(azimuth + 0.1 * normal(rng), droop + 0.15 * normal(rng), 0.25 * normal(rng));
@@ -85,13 +84,8 @@ impl Grower<'_> {
     }
 
     fn blade(&self, rng: &mut Seeded) -> Blade {
-        let mut gamma = coefficients(rng, self.species.leaf.deform.rank(), 0.7);
         // Leaflets arch down a little.
-        gamma[0] += 0.5;
+        let gamma = scattered(rng, drooping_blade(self.species, 0.3), 0.7);
         Blade { beta: coefficients(rng, self.species.leaf.shape.rank(), 0.8), gamma, width: 1.0 }
     }
-}
-
-fn stem_bends(species: &Species, rng: &mut Seeded, spread: f64) -> Vec<f64> {
-    coefficients(rng, species.stem.deform.rank(), spread)
 }

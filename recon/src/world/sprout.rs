@@ -2,12 +2,13 @@
 
 use demeter_frame::Pose;
 use glam::{DMat3, DQuat, DVec3};
+use nalgebra::DVector;
 use rand::Rng;
 
 use super::Seeded;
 use crate::model::kinematics::attachment;
-use crate::model::leaf::Blade;
-use crate::model::stem::StemCurve;
+use crate::model::leaf::{self, Blade, ROWS, vein_angle};
+use crate::model::stem::{self, BONES, StemCurve};
 use crate::model::{Form, Joint, Organ, Plant, Species};
 
 /// Organs so far with what their children need: rotation, size and curve of each.
@@ -89,6 +90,31 @@ pub(super) fn normal(rng: &mut Seeded) -> f64 {
             return x;
         }
     }
+}
+
+/// Deformation of a blade that droops from base to tip by `turn` radians in all, evenly, as nearly as its species
+/// knows how.
+pub(super) fn drooping_blade(species: &Species, turn: f64) -> Vec<f64> {
+    let mut angles = DVector::zeros(leaf::ANGLES);
+    for row in 1..ROWS {
+        // Turning about +x by a negative angle takes the tip away from the upper side.
+        angles[vein_angle(row)] = -turn / (ROWS - 1) as f64;
+    }
+    species.leaf.deform.project(&angles)
+}
+
+/// Deformation of a stem that bends towards its +z by `turn` radians in all, evenly.
+pub(super) fn bent_stem(species: &Species, turn: f64) -> Vec<f64> {
+    let mut angles = DVector::zeros(stem::ANGLES);
+    for bone in 0..BONES {
+        angles[2 * bone] = turn / BONES as f64;
+    }
+    species.stem.deform.project(&angles)
+}
+
+/// `coefficients` moved by random ones times `spread`, within what the model allows.
+pub(super) fn scattered(rng: &mut Seeded, coefficients: Vec<f64>, spread: f64) -> Vec<f64> {
+    coefficients.into_iter().map(|c| (c + spread * normal(rng)).clamp(-3.0, 3.0)).collect()
 }
 
 /// `count` standard normal coefficients times `spread`.
