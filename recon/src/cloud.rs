@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::model::OrganKind;
+
 /// A point cloud in metres, z up unless its source said otherwise and was turned.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
@@ -11,6 +13,17 @@ pub struct PointCloud {
     pub colours: Option<Vec<[u8; 3]>>,
     /// Organ labels, one a point, when the source has them: 0 = stems, 1.. = one leaf node each.
     pub labels: Option<Vec<i32>>,
+    /// Organs with their kinds, one a point, when the source has every organ apart, stems too.
+    pub organs: Option<Vec<PointOrgan>>,
+}
+
+/// Which organ a point belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PointOrgan {
+    /// A number of the organ's own, negative for none; the PLY property `organ`.
+    pub organ: i32,
+    /// Its kind; the PLY property `kind`: 0 main stem, 1 stem or petiole, 2 leaf.
+    pub kind: OrganKind,
 }
 
 /// Diagonal of the points' axis-aligned bounding box in metres, `None` without points.

@@ -4,8 +4,8 @@
 mod common;
 
 use common::shared;
-use demeter_recon::cloud::{PointCloud, diagonal};
-use demeter_recon::export::{PointOrgan, cloud_to_ply};
+use demeter_recon::cloud::{PointCloud, PointOrgan, diagonal};
+use demeter_recon::export::cloud_to_ply;
 use demeter_recon::import::{MAX_POINTS, PlyError};
 use demeter_recon::model::OrganKind;
 use glam::DVec3;
@@ -14,11 +14,13 @@ use proptest::prelude::*;
 fn clouds() -> impl Strategy<Value = PointCloud> {
     let number = prop_oneof![-1e3..1e3_f64, any::<f64>().prop_filter("finite", |x| x.is_finite())];
     let point = [number.clone(), number.clone(), number].prop_map(DVec3::from_array);
-    let rows = prop::collection::vec((point, any::<[u8; 3]>(), any::<i32>()), 0..40);
-    (rows, any::<bool>(), any::<bool>()).prop_map(|(rows, coloured, labelled)| PointCloud {
+    let kind = prop::sample::select(vec![OrganKind::MainStem, OrganKind::Stem, OrganKind::Leaf]);
+    let rows = prop::collection::vec((point, any::<[u8; 3]>(), any::<i32>(), kind), 0..40);
+    (rows, any::<[bool; 3]>()).prop_map(|(rows, [coloured, labelled, apart])| PointCloud {
         points: rows.iter().map(|r| r.0).collect(),
         colours: coloured.then(|| rows.iter().map(|r| r.1).collect()),
         labels: labelled.then(|| rows.iter().map(|r| r.2).collect()),
+        organs: apart.then(|| rows.iter().map(|r| PointOrgan { organ: r.2, kind: r.3 }).collect()),
     })
 }
 
@@ -37,6 +39,9 @@ fn other_encoding(cloud: &PointCloud, format: &str, ends_in_newline: bool) -> Ve
     if cloud.labels.is_some() {
         header += "property int instance\n";
     }
+    if cloud.organs.is_some() {
+        header += "property uchar kind\nproperty int organ\n";
+    }
     header += "end_header\n";
     let mut bytes = header.into_bytes();
     let mut rows: Vec<Vec<Word>> = vec![vec![Word::U16(1), Word::I16(-7), Word::F64(1.5)]; 2];
@@ -44,6 +49,7 @@ fn other_encoding(cloud: &PointCloud, format: &str, ends_in_newline: bool) -> Ve
         let mut row = vec![Word::F64(p.z), Word::U8(1), Word::I32(9), Word::F64(p.x), Word::F64(p.y)];
         row.extend(cloud.colours.iter().flat_map(|c| c[i].iter().rev().map(|b| Word::U8(*b))));
         row.extend(cloud.labels.iter().map(|l| Word::I32(l[i])));
+        row.extend(cloud.organs.iter().flat_map(|o| [Word::U8(o[i].kind as u8), Word::I32(o[i].organ)]));
         rows.push(row);
     }
     if format == "ascii" {
@@ -97,7 +103,7 @@ proptest! {
 
     #[test]
     fn a_cloud_written_reads_back_equal(cloud in clouds()) {
-        prop_assert_eq!(PointCloud::from_ply(&cloud_to_ply(&cloud, None)), Ok(cloud));
+        prop_assert_eq!(PointCloud::from_ply(&cloud_to_ply(&cloud)), Ok(cloud));
     }
 
     #[test]
@@ -129,6 +135,7 @@ proptest! {
             prop_assert!(read.points.iter().all(|p| p.is_finite()));
             prop_assert!(read.colours.is_none_or(|c| c.len() == read.points.len()));
             prop_assert!(read.labels.is_none_or(|l| l.len() == read.points.len()));
+            prop_assert!(read.organs.is_none_or(|o| o.len() == read.points.len()));
         }
     }
 }
@@ -166,13 +173,20 @@ fn bad_files_are_refused_by_name() {
 }
 
 #[test]
-fn organs_are_extra_properties_that_readers_skip() {
-    let cloud = PointCloud { points: vec![DVec3::X, DVec3::Y], ..PointCloud::default() };
+fn organs_are_two_properties_after_all_others() {
     let organs = [PointOrgan { organ: 0, kind: OrganKind::MainStem }, PointOrgan { organ: 258, kind: OrganKind::Leaf }];
-    let bytes = cloud_to_ply(&cloud, Some(&organs));
+    let cloud = PointCloud { points: vec![DVec3::X, DVec3::Y], organs: Some(organs.to_vec()), ..PointCloud::default() };
+    let bytes = cloud_to_ply(&cloud);
     assert!(String::from_utf8_lossy(&bytes).contains("property int organ\nproperty uchar kind\nend_header\n"));
     assert_eq!(bytes[bytes.len() - 5..], [2, 1, 0, 0, 2]);
-    assert_eq!(PointCloud::from_ply(&bytes), Ok(cloud));
+    let apart = |properties: &str, row: &str| {
+        let xyz = "element vertex 1\nproperty float x\nproperty float y\nproperty float z";
+        ascii(&format!("{xyz}{properties}"), &format!("0 0 0 {row}")).map(|cloud| cloud.organs)
+    };
+    let both = "\nproperty int organ\nproperty int kind";
+    assert_eq!(apart(both, "7 2"), Ok(Some(vec![PointOrgan { organ: 7, kind: OrganKind::Leaf }])));
+    assert!(matches!(apart(both, "7 3"), Err(PlyError::Vertex { vertex: 0, .. })), "there is no fourth kind");
+    assert_eq!(apart("\nproperty int organ", "7"), Ok(None), "an organ without its kind says nothing");
 }
 
 #[test]

@@ -51,7 +51,7 @@ fn cloud() -> impl Strategy<Value = PointCloud> {
                     _ => {}
                 }
             }
-            PointCloud { labels: labels.map(|l| l[..points.len()].to_vec()), points, colours: None }
+            PointCloud { labels: labels.map(|l| l[..points.len()].to_vec()), points, ..PointCloud::default() }
         },
     )
 }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::ValueEnum;
-use demeter_recon::cloud::PointCloud;
-use demeter_recon::export::{PointOrgan, cloud_to_ply};
+use demeter_recon::cloud::{PointCloud, PointOrgan};
+use demeter_recon::export::cloud_to_ply;
 use demeter_recon::model::OrganKind;
 use demeter_recon::organs::{OrganTree, ScaleSource};
 use demeter_recon::record::encode_exact;
@@ -27,7 +27,9 @@ pub struct Args {
     /// Species to fit.
     #[arg(long)]
     species: String,
-    /// Organ labels: the cloud's own when it has them (auto), required (label), or found by geometry (none).
+    /// Where organs come from. auto: the cloud's properties `organ` and `kind` (0 main stem, 1 stem or petiole, 2
+    /// leaf; negative organs are left out), as --points writes them; else its `label` (0 all stems, 1.. one a leaf),
+    /// else geometry. label: its `label`, which it must have. none: geometry.
     #[arg(long, value_enum, default_value_t)]
     labels: LabelSource,
     /// Unit of the cloud's coordinates.
@@ -45,7 +47,7 @@ pub struct Args {
     /// Also write the plant's surface: .ply, .obj or .glb.
     #[arg(long)]
     mesh: Option<PathBuf>,
-    /// Also write the input points, in order, with `organ` and `kind`.
+    /// Also write the input points, in order, with `organ` and `kind`; `fit` takes the file as organs already apart.
     #[arg(long)]
     points: Option<PathBuf>,
 }
@@ -115,7 +117,8 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         files::write_mesh(path, &described.plant, &species)?;
     }
     if let Some(path) = &args.points {
-        files::write(path, &cloud_to_ply(&cloud, Some(&point_organs(&cloud, &tree, &fitted))))?;
+        cloud.organs = Some(point_organs(cloud.points.len(), &tree, &fitted));
+        files::write(path, &cloud_to_ply(&cloud))?;
     }
     described.report.record = Some(args.output.display().to_string());
     described.report.ms = Some(started.elapsed().as_secs_f64() * 1e3);
@@ -133,9 +136,9 @@ impl Args {
 }
 
 /// The organ of the record that each point was given to.
-fn point_organs(cloud: &PointCloud, tree: &OrganTree, fitted: &fit::Fitted) -> Vec<PointOrgan> {
+fn point_organs(points: usize, tree: &OrganTree, fitted: &fit::Fitted) -> Vec<PointOrgan> {
     // Labels of fewer points than an organ needs belong to none.
-    let mut organs = vec![PointOrgan { organ: -1, kind: OrganKind::Stem }; cloud.points.len()];
+    let mut organs = vec![PointOrgan { organ: -1, kind: OrganKind::Stem }; points];
     for (organ, fit) in fitted.organs.iter().enumerate() {
         let Some(source) = fit.source.map(|k| &tree.organs[k]) else { continue };
         for i in &source.source {

@@ -6,7 +6,7 @@ mod ply;
 
 pub use glb::mesh_to_glb;
 pub use obj::mesh_to_obj;
-pub use ply::{PointOrgan, cloud_to_ply, mesh_to_ply};
+pub use ply::{cloud_to_ply, mesh_to_ply};
 
 use crate::model::OrganKind;
 

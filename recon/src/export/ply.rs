@@ -5,21 +5,12 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 use crate::cloud::PointCloud;
-use crate::model::{OrganKind, PlantMesh};
-
-/// Which organ a point belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PointOrgan {
-    /// Index of the organ in the plant, -1 for none; the property `organ`.
-    pub organ: i32,
-    /// Its kind; the property `kind`: 0 main stem, 1 stem, 2 leaf.
-    pub kind: OrganKind,
-}
+use crate::model::PlantMesh;
 
 /// A cloud as PLY: `double x y z` (so that reading it back gives the same cloud), `uchar red green blue` and
-/// `int label` where the cloud has them, `int organ, uchar kind` when `organs` has one entry a point.
+/// `int label`, `int organ` and `uchar kind` where the cloud has them.
 #[must_use]
-pub fn cloud_to_ply(cloud: &PointCloud, organs: Option<&[PointOrgan]>) -> Vec<u8> {
+pub fn cloud_to_ply(cloud: &PointCloud) -> Vec<u8> {
     let mut header = header(cloud.points.len(), "double x,double y,double z");
     if cloud.colours.is_some() {
         properties(&mut header, "uchar red,uchar green,uchar blue");
@@ -27,7 +18,7 @@ pub fn cloud_to_ply(cloud: &PointCloud, organs: Option<&[PointOrgan]>) -> Vec<u8
     if cloud.labels.is_some() {
         properties(&mut header, "int label");
     }
-    if organs.is_some() {
+    if cloud.organs.is_some() {
         properties(&mut header, "int organ,uchar kind");
     }
     let mut bytes = finish(header);
@@ -39,7 +30,7 @@ pub fn cloud_to_ply(cloud: &PointCloud, organs: Option<&[PointOrgan]>) -> Vec<u8
         if let Some(labels) = &cloud.labels {
             bytes.extend(labels[i].to_le_bytes());
         }
-        if let Some(organs) = organs {
+        if let Some(organs) = &cloud.organs {
             bytes.extend(organs[i].organ.to_le_bytes());
             bytes.push(organs[i].kind as u8);
         }

@@ -7,7 +7,8 @@ use serde::Deserialize;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyReader, PropertyType, ScalarType};
 
-use crate::cloud::PointCloud;
+use crate::cloud::{PointCloud, PointOrgan};
+use crate::model::OrganKind;
 
 /// Most points a cloud may have: a bound on memory (1 GB as read), 50 times the largest scan in our data.
 pub const MAX_POINTS: usize = 20_000_000;
@@ -49,7 +50,7 @@ pub enum PlyError {
         /// What the reader found.
         found: String,
     },
-    /// A vertex whose numbers are not finite or whose label is no 32-bit integer.
+    /// A vertex whose numbers are not finite, whose label or organ is no 32-bit integer, or whose kind is none.
     #[error("PLY vertex {vertex}: expected {expected}, found {found}")]
     Vertex {
         /// Index of the vertex.
@@ -63,7 +64,8 @@ pub enum PlyError {
 
 impl PointCloud {
     /// Reads the element `vertex` of a PLY file: `x y z` of any scalar type; `red green blue` when all three are
-    /// uchar; the organ label from `label`, else from `instance`, of any scalar type. All else is skipped.
+    /// uchar; the organ label from `label`, else from `instance`; the organ with its kind from `organ` and `kind` when
+    /// both are there, of any scalar type. All else is skipped.
     ///
     /// Positions are taken as they are: PLY states neither unit nor axes. A point that is not finite refuses the file
     /// instead of vanishing from it.
@@ -102,6 +104,7 @@ impl PointCloud {
             points: rows.points,
             colours: coloured.then_some(rows.colours),
             labels: (has("label") || has("instance")).then_some(rows.labels),
+            organs: (has("organ") && has("kind")).then_some(rows.organs),
         })
     }
 }
@@ -167,6 +170,10 @@ struct Row {
     label: Option<f64>,
     #[serde(default)]
     instance: Option<f64>,
+    #[serde(default)]
+    organ: Option<f64>,
+    #[serde(default)]
+    kind: Option<f64>,
 }
 
 /// All vertices, gathered row by row so that only what is kept takes memory.
@@ -175,6 +182,7 @@ struct Rows {
     points: Vec<DVec3>,
     colours: Vec<[u8; 3]>,
     labels: Vec<i32>,
+    organs: Vec<PointOrgan>,
     /// The first bad vertex: index, what was expected, what was found.
     bad: Option<(usize, &'static str, String)>,
 }
@@ -191,14 +199,25 @@ impl Rows {
             self.colours.push([r as u8, g as u8, b as u8]);
         }
         if let Some(label) = row.label.or(row.instance) {
-            let rounded = label.round();
-            if !(f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&rounded) {
-                return Err(("a 32-bit label", label.to_string()));
-            }
-            self.labels.push(rounded as i32);
+            self.labels.push(integer(label).ok_or_else(|| ("a 32-bit label", label.to_string()))?);
+        }
+        if let (Some(organ), Some(kind)) = (row.organ, row.kind) {
+            self.organs.push(PointOrgan {
+                organ: integer(organ).ok_or_else(|| ("a 32-bit organ", organ.to_string()))?,
+                kind: [OrganKind::MainStem, OrganKind::Stem, OrganKind::Leaf]
+                    .into_iter()
+                    .find(|k| f64::from(*k as u8) == kind)
+                    .ok_or_else(|| ("a kind of 0, 1 or 2", kind.to_string()))?,
+            });
         }
         Ok(())
     }
+}
+
+/// The nearest integer, `None` beyond 32 bits.
+fn integer(x: f64) -> Option<i32> {
+    let rounded = x.round();
+    (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&rounded).then_some(rounded as i32)
 }
 
 impl<'de> Deserialize<'de> for Rows {

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::{MIN_ORGAN_POINTS, grain, ground_point, organ, split_stems};
+use super::{MIN_ORGAN_POINTS, grain, nearest_to, organ, split_stems};
 use crate::axes::PrincipalAxes;
 use crate::graph::{CloudGraph, pieces, prune, skeleton};
 use crate::model::OrganKind;
@@ -24,7 +24,7 @@ const SAME_LEAF_COSINE: f64 = 0.82;
 /// Neighbours whose votes smooth the classes.
 const VOTERS: usize = 15;
 
-pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
+pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3) -> Vec<OrganCloud> {
     let search = Nearest::of(points);
     let grain = grain(points, &search, 10);
     let radius = (SCALE_SHARE * crate::cloud::diagonal(points).unwrap_or(0.0)).max(2.0 * grain);
@@ -36,7 +36,7 @@ pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
     for _ in 0..2 {
         is_stem = near.iter().map(|n| 2 * n.iter().filter(|j| is_stem[**j]).count() > n.len()).collect();
     }
-    let base = ground_point(points, up);
+    let base = nearest_to(points, foot);
     // The foot is a stem whatever it looks like.
     for n in search.within(points[base], radius) {
         is_stem[n.index] = true;
@@ -53,7 +53,7 @@ pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
     let (leaves, crumbs): (Vec<_>, Vec<_>) = clusters.into_iter().partition(|c| c.len() >= least);
     let stems: Vec<usize> = (0..points.len()).filter(|i| is_stem[*i]).collect();
     let (leaves, stems) = adopt(points, leaves, stems, crumbs.concat());
-    let mut organs = split_stems(points, &stems, up);
+    let mut organs = split_stems(points, &stems, foot, up);
     let stem_points: Vec<DVec3> = stems.iter().map(|i| points[*i]).collect();
     let stem_search = Nearest::of(&stem_points);
     for cluster in leaves {

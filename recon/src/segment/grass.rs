@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::{MIN_ORGAN_POINTS, grain, ground_point, organ};
+use super::{MIN_ORGAN_POINTS, grain, nearest_to, organ};
 use crate::graph::{CloudGraph, prune, skeleton};
 use crate::model::OrganKind;
 use crate::nearest::Nearest;
@@ -12,11 +12,11 @@ use crate::organs::OrganCloud;
 /// Shortest path that counts as a leaf, as a share of the bounding box diagonal (a guess: shorter ones are spurs).
 const LEAF_SHARE: f64 = 0.06;
 
-pub(super) fn segment(points: &[DVec3], up: DVec3) -> Vec<OrganCloud> {
+pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3) -> Vec<OrganCloud> {
     let grain = grain(points, &Nearest::of(points), 10);
     let diagonal = crate::cloud::diagonal(points).unwrap_or(0.0);
     let graph = CloudGraph::new(points);
-    let base = ground_point(points, up);
+    let base = nearest_to(points, foot);
     let branches = skeleton(points, &graph, base, 2.0 * grain, |centre, _| centre.dot(up));
     let branches = prune(branches, points, (LEAF_SHARE * diagonal).max(4.0 * grain));
     let trunk = &branches[0];

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::{MIN_ORGAN_POINTS, SegmentError, Segmented, Up, is_fittable, organ, split_stems};
-use crate::model::{Habit, OrganKind};
+use crate::model::OrganKind;
 
-pub(super) fn segment(points: &[DVec3], labels: &[i32], habit: Habit, up: Up) -> Result<Segmented, SegmentError> {
+pub(super) fn segment(points: &[DVec3], labels: &[i32], up: Up) -> Result<Segmented, SegmentError> {
     let mut members: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
     for (i, label) in labels.iter().enumerate().take(points.len()) {
         members.entry(*label.max(&0)).or_default().push(i);
@@ -21,8 +21,8 @@ pub(super) fn segment(points: &[DVec3], labels: &[i32], habit: Habit, up: Up) ->
     for i in &stems {
         is_stem[*i] = true;
     }
-    let up = up.resolve(points, Some(&is_stem), habit);
-    let mut organs = split_stems(points, &stems, up);
+    let (up, foot) = up.resolve(points, Some(&is_stem));
+    let mut organs = split_stems(points, &stems, foot.point, up);
     let leaves = members.into_values().filter(|m| m.len() >= MIN_ORGAN_POINTS);
     organs.extend(leaves.map(|m| organ(points, OrganKind::Leaf, m)));
     organs.retain(is_fittable);

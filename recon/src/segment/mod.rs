@@ -1,8 +1,11 @@
 //! Clouds to organs (spec/reconstruction.md "Points to organs"): by labels where there are any, else by geometry.
 
+mod apart;
 mod broadleaf;
+mod foot;
 mod grass;
 mod labelled;
+mod thin;
 mod up;
 
 use glam::DVec3;
@@ -18,10 +21,10 @@ pub use up::Up;
 /// Where organ labels come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Labels {
-    /// The cloud's own when it has them, else geometry.
+    /// The cloud's organs when they are apart already, else its labels, else geometry.
     #[default]
     Auto,
-    /// The cloud's own; it must have them.
+    /// The cloud's labels; it must have them.
     Own,
     /// Geometry, whatever the cloud says.
     None,
@@ -50,6 +53,12 @@ pub enum SegmentError {
         /// What is there.
         found: &'static str,
     },
+    /// Organs are apart, and the points of one disagree about what it is.
+    #[error("organ {organ}: expected one `kind` for all its points, found several")]
+    Kinds {
+        /// Its number.
+        organ: i32,
+    },
 }
 
 /// Fewest points of a cloud that may be a plant.
@@ -69,7 +78,8 @@ pub struct Segmented {
 /// Divides a cloud into organs.
 ///
 /// # Errors
-/// [`SegmentError`] when the cloud is too small, not finite, or lacks labels that were asked for.
+/// [`SegmentError`] when the cloud is too small, not finite, or lacks labels that were asked for,
+/// or when a given organ is of several kinds.
 pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Result<Segmented, SegmentError> {
     let found = cloud.points.len();
     if found < MIN_POINTS {
@@ -80,18 +90,16 @@ pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Resu
     if !(found_metres.is_finite() && found_metres > 1e-3) {
         return Err(SegmentError::Extent { found_metres });
     }
-    let own = match (labels, &cloud.labels) {
-        (Labels::None, _) | (Labels::Auto, None) => None,
-        (Labels::Own, None) => return Err(SegmentError::Labels { found: "none" }),
-        (_, Some(own)) => Some(own),
-    };
-    match own {
-        Some(own) => labelled::segment(&cloud.points, own, habit, up),
-        None => {
-            let up = up.resolve(&cloud.points, None, habit);
+    match (labels, &cloud.organs, &cloud.labels) {
+        (Labels::Auto, Some(organs), _) => apart::segment(&cloud.points, organs, up),
+        (Labels::Auto | Labels::Own, _, Some(own)) => labelled::segment(&cloud.points, own, up),
+        (Labels::Own, _, None) => Err(SegmentError::Labels { found: "none" }),
+        (Labels::None, _, _) | (Labels::Auto, None, None) => {
+            let (up, foot) = up.resolve(&cloud.points, None);
+
             let organs = match habit {
-                Habit::Grass => grass::segment(&cloud.points, up),
-                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, up),
+                Habit::Grass => grass::segment(&cloud.points, foot.point, up),
+                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, foot.point, up),
             };
             Ok(Segmented { organs: organs.into_iter().filter(is_fittable).collect(), up })
         }
@@ -121,18 +129,19 @@ fn grain(points: &[DVec3], search: &Nearest, k: usize) -> f64 {
     median_of(gaps).unwrap_or(0.0).max(1e-6)
 }
 
-/// The point where a plant meets the ground: the lowest one.
-fn ground_point(points: &[DVec3], up: DVec3) -> usize {
-    (0..points.len()).fold(0, |low, i| if points[i].dot(up) < points[low].dot(up) { i } else { low })
+/// Index of the point nearest to a place.
+fn nearest_to(points: &[DVec3], place: DVec3) -> usize {
+    let nearer = |i: usize, j: usize| points[i].distance_squared(place) < points[j].distance_squared(place);
+    (0..points.len()).fold(0, |best, i| if nearer(i, best) { i } else { best })
 }
 
 /// Divides stem points into the main stem and its branches along their skeleton.
-fn split_stems(points: &[DVec3], members: &[usize], up: DVec3) -> Vec<OrganCloud> {
+fn split_stems(points: &[DVec3], members: &[usize], foot: DVec3, up: DVec3) -> Vec<OrganCloud> {
     let own: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
     let graph = CloudGraph::new(&own);
     // The third neighbour, because stems of sparse scans are single rows of points.
     let grain = grain(&own, &Nearest::of(&own), 3);
-    let base = ground_point(&own, up);
+    let base = nearest_to(&own, foot);
     let branches = crate::graph::skeleton(&own, &graph, base, 2.0 * grain, |centre, _| centre.dot(up));
     let kept = crate::graph::prune(branches, &own, 4.0 * grain);
     kept.into_iter()

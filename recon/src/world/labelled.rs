@@ -48,7 +48,7 @@ pub fn labelled_cloud(
         labels.push(label_of[organ as usize]);
         organs.push(organ);
     }
-    Ok(LabelledCloud { cloud: PointCloud { points, colours: None, labels: Some(labels) }, organ: organs })
+    Ok(LabelledCloud { cloud: PointCloud { points, labels: Some(labels), ..PointCloud::default() }, organ: organs })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
-use demeter_recon::export::{PointOrgan, cloud_to_ply};
+use demeter_recon::cloud::PointOrgan;
+use demeter_recon::export::cloud_to_ply;
 use demeter_recon::world::{grow, labelled_cloud, seeded};
 
 use super::unit_interval;
@@ -41,11 +42,11 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         let mut rng = seeded(args.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(u64::from(i)));
         let age = args.age * (f64::from(i) + 1.0) / f64::from(args.count);
         let plant = grow(&species, age, &mut rng);
-        let made = labelled_cloud(&plant, &species, args.points as usize, args.noise * 1e-3, &mut rng)
+        let mut made = labelled_cloud(&plant, &species, args.points as usize, args.noise * 1e-3, &mut rng)
             .map_err(|error| CommandError::failed("world", &error))?;
         let organ = |organ: &u32| PointOrgan { organ: *organ as i32, kind: plant.organs[*organ as usize].kind() };
-        let organs: Vec<PointOrgan> = made.organ.iter().map(organ).collect();
-        files::write(&args.output.join(format!("{i:04}.ply")), &cloud_to_ply(&made.cloud, Some(&organs)))?;
+        made.cloud.organs = Some(made.organ.iter().map(organ).collect());
+        files::write(&args.output.join(format!("{i:04}.ply")), &cloud_to_ply(&made.cloud))?;
     }
     if output.json {
         output.json(&serde_json::json!({"clouds": args.count}))?;
