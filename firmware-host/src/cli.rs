@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::{decode, doctor, fit, photo, plants, replay, run, synth};
+use crate::commands::{decode, doctor, eval, fit, photo, plants, replay, run, synth};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -25,6 +25,8 @@ struct Cli {
 enum Command {
     /// Turn a record back into its plant.
     Decode(decode::Args),
+    /// Measure the method: tables of figures beside their goals.
+    Eval(eval::Args),
     /// Fit a point cloud.
     Fit(fit::Args),
     /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
@@ -45,6 +47,7 @@ impl Command {
     fn run(&self, output: &Output) -> Result<Exit, CommandError> {
         match self {
             Self::Decode(args) => decode::run(args, output),
+            Self::Eval(args) => eval::run(args, output),
             Self::Fit(args) => fit::run(args, output),
             Self::Doctor(args) => doctor::run(args, output),
             Self::Photo(args) => photo::run(args, output),

@@ -2,6 +2,7 @@
 
 pub mod decode;
 pub mod doctor;
+pub mod eval;
 pub mod fit;
 pub mod photo;
 pub mod plants;

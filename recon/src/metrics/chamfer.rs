@@ -1,4 +1,4 @@
-//! How well a surface explains a cloud (spec/reconstruction.md "Metrics"): defined once, used everywhere.
+//! Chamfer distance between a cloud and a surface.
 
 use glam::DVec3;
 use rand::{Rng, SeedableRng};

@@ -1,0 +1,9 @@
+//! How well a result agrees with data or truth (spec/reconstruction.md "Metrics"): defined once, used everywhere.
+
+mod agreement;
+mod chamfer;
+mod parents;
+
+pub use agreement::{Agreement, Pair, quantile};
+pub use chamfer::{Chamfer, SURFACE_SAMPLES, chamfer, sample_surface};
+pub use parents::{Parents, right_parents};
