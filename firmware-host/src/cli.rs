@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::{decode, doctor, eval, fit, photo, plants, replay, run, synth};
+use crate::commands::{decode, doctor, eval, fit, learn, photo, plants, replay, run, synth};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -29,6 +29,8 @@ enum Command {
     Eval(eval::Args),
     /// Fit a point cloud.
     Fit(fit::Args),
+    /// Learn a species from scans.
+    Learn(learn::Args),
     /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
     Doctor(doctor::Args),
     /// Reconstruct the plants of a photo.
@@ -49,6 +51,7 @@ impl Command {
             Self::Decode(args) => decode::run(args, output),
             Self::Eval(args) => eval::run(args, output),
             Self::Fit(args) => fit::run(args, output),
+            Self::Learn(args) => learn::run(args, output),
             Self::Doctor(args) => doctor::run(args, output),
             Self::Photo(args) => photo::run(args, output),
             Self::Replay(args) => replay::run(args, output),

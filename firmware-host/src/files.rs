@@ -58,16 +58,25 @@ pub fn write_mesh(path: &Path, plant: &Plant, species: &Species) -> Result<(), C
     write(path, &bytes)
 }
 
-/// The shipped species of that name.
+/// The species of that name, or in the file of that name when it ends in `.safetensors`.
 ///
 /// # Errors
-/// [`CommandError`] `species` (exit 2) listing the names there are.
+/// [`CommandError`] `species`: exit 2 for a name that is none, listing the names there are, exit 1 for a file that is
+/// refused.
 pub fn species(name: &str) -> Result<Species, CommandError> {
+    if Path::new(name).extension().is_some_and(|extension| extension == "safetensors") {
+        let refused = |error| {
+            let mut refused = CommandError::failed("species", &error);
+            refused.message = format!("{name}: {}", refused.message);
+            refused
+        };
+        return Species::from_bytes(&read(Path::new(name))?).map_err(refused);
+    }
     let known = demeter_recon::species::NAMES.join(", ");
     match demeter_recon::species::shipped(name) {
         Some(species) => species.map_err(|error| CommandError::failed("species", &error)),
         None => {
-            let message = format!("--species: expected one of {known}, found `{name}`");
+            let message = format!("--species: expected one of {known} or a .safetensors file, found `{name}`");
             Err(CommandError::usage("species", message).with(known, name))
         }
     }

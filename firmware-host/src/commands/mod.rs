@@ -4,6 +4,7 @@ pub mod decode;
 pub mod doctor;
 pub mod eval;
 pub mod fit;
+pub mod learn;
 pub mod photo;
 pub mod plants;
 pub mod replay;

@@ -27,7 +27,7 @@ const INDEPENDENT: f64 = 150.0;
 
 /// A fitted blade in the world.
 #[derive(Clone, Debug)]
-pub(super) struct LeafFit {
+pub(crate) struct LeafFit {
     /// world_from_organ rotation, gauged.
     pub rotation: DQuat,
     /// Chord of the flat blade, metres.
@@ -66,7 +66,7 @@ struct Data<'a> {
 }
 
 /// Fits a blade whose base is attached at `base`; `up` tells the upper side where the cloud cannot.
-pub(super) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -> LeafFit {
+pub(crate) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -> LeafFit {
     let coarse = Data::new(points, base, species, FEW_POINTS);
     let fine = Data::new(points, base, species, MAX_POINTS);
     let near = |mut state: State| {

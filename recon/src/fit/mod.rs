@@ -11,7 +11,7 @@ mod hanger;
 mod leaf;
 mod leaflets;
 mod orient;
-mod solver;
+pub(crate) mod solver;
 mod stem;
 
 use builder::{Builder, Source};
@@ -19,6 +19,7 @@ use demeter_frame::Pose;
 pub use error::FitError;
 pub(crate) use error::{MIN_EXTENT, MIN_POINTS};
 use glam::{DQuat, DVec3};
+pub(crate) use leaf::fit as blade;
 pub(crate) use stem::median as median_of;
 
 use crate::cloud::thinned;

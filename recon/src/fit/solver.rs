@@ -4,26 +4,26 @@ use nalgebra::{DMatrix, DVector};
 
 /// Normal equations of a weighted least-squares problem at one state.
 #[derive(Clone, Debug)]
-pub(super) struct Normal {
+pub(crate) struct Normal {
     pub h: DMatrix<f64>,
     pub g: DVector<f64>,
     pub cost: f64,
 }
 
 impl Normal {
-    pub(super) fn new(parameters: usize) -> Self {
+    pub(crate) fn new(parameters: usize) -> Self {
         Self { h: DMatrix::zeros(parameters, parameters), g: DVector::zeros(parameters), cost: 0.0 }
     }
 
     /// Adds `weight * residual²` with the residual's gradient.
-    pub(super) fn add(&mut self, residual: f64, row: &[f64], weight: f64) {
+    pub(crate) fn add(&mut self, residual: f64, row: &[f64], weight: f64) {
         self.cost += weight * residual * residual;
         self.add_many(weight * residual, row, weight);
     }
 
     /// Adds residuals that share a gradient: the sums of `weight * residual` and of `weight`. Their cost is the
     /// caller's to add. Only the upper triangle is kept up.
-    pub(super) fn add_many(&mut self, weighted: f64, row: &[f64], weight: f64) {
+    pub(crate) fn add_many(&mut self, weighted: f64, row: &[f64], weight: f64) {
         for (j, rj) in row.iter().enumerate() {
             self.g[j] += weighted * rj;
             let scaled = weight * rj;
@@ -34,7 +34,7 @@ impl Normal {
     }
 
     /// Adds a pull of parameter `i` (now `value`) towards 0.
-    pub(super) fn prior(&mut self, i: usize, value: f64, weight: f64) {
+    pub(crate) fn prior(&mut self, i: usize, value: f64, weight: f64) {
         self.cost += weight * value * value;
         self.g[i] += weight * value;
         self.h[(i, i)] += weight;
@@ -55,7 +55,7 @@ impl Normal {
 /// Minimises from `state`; `normal` linearises (and finds correspondences anew), `apply` takes a step inside the
 /// model. A step is kept only when the newly matched cost falls. True when the cost stopped falling before the
 /// iterations ran out.
-pub(super) fn minimise<S: Clone>(
+pub(crate) fn minimise<S: Clone>(
     state: &mut S,
     iterations: usize,
     normal: impl Fn(&S) -> Normal,

@@ -1,5 +1,7 @@
 //! Files of others, read from bytes.
 
 mod ply;
+mod text;
 
 pub use ply::{MAX_POINTS, PlyError};
+pub use text::TextError;

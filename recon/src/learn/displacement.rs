@@ -1,0 +1,160 @@
+//! Bends measured by how far they move an organ's points: the metric in which principal components are taken.
+//!
+//! An angle near the base moves more points than one near the tip, so variance of angles says little about variance
+//! of surfaces. With x the coefficients of the smooth basis and J the derivative of the control points by them at the
+//! mean organ, less what a rotation of the whole organ takes back, y = R x with RᵀR = JᵀJ / points has the
+//! root-mean-square displacement as its length.
+
+use glam::DVec3;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::pca::Pca;
+use crate::model::leaf::Blade;
+use crate::model::{Basis, BasisError, Species};
+
+/// Ridge on RᵀR as a share of its mean diagonal, so that a mode that moves nothing has an inverse.
+const RIDGE: f64 = 1e-9;
+
+/// The change of coordinates between a smooth basis of angles and displacements.
+#[derive(Clone, Debug)]
+pub(super) struct Displacement {
+    smooth: Basis,
+    /// R, upper triangular.
+    factor: DMatrix<f64>,
+}
+
+impl Displacement {
+    /// Of the species' blades, at its mean shape and at the mean of `coefficients`. Organs are of unit length.
+    pub(super) fn of_leaf(smooth: &Species, mean: Vec<f64>) -> Option<Self> {
+        let blade = Blade { beta: Vec::new(), gamma: mean, width: 1.0 };
+        let jacobian = smooth.leaf.jacobian(&blade);
+        let (first, stride) = (smooth.leaf.shape.rank(), jacobian.coefficients);
+        Self::of(&smooth.leaf.deform, &jacobian.points, |n, k| jacobian.derivatives[n * stride + first + k])
+    }
+
+    /// Of the species' stems.
+    pub(super) fn of_stem(smooth: &Species, mean: &[f64]) -> Option<Self> {
+        let jacobian = smooth.stem.jacobian(mean);
+        let stride = jacobian.coefficients;
+        Self::of(&smooth.stem.deform, &jacobian.points, |n, k| jacobian.derivatives[n * stride + k])
+    }
+
+    fn of(smooth: &Basis, points: &[DVec3], velocity: impl Fn(usize, usize) -> DVec3) -> Option<Self> {
+        let rows = 3 * points.len();
+        let scale = 1.0 / (points.len() as f64).sqrt();
+        let flat = |of: &dyn Fn(usize) -> DVec3| {
+            DVector::from_iterator(rows, (0..points.len()).flat_map(|n| (of(n) * scale).to_array()))
+        };
+        let turns = DMatrix::from_columns(&DVec3::AXES.map(|axis| flat(&|n| axis.cross(points[n]))));
+        let moves = DMatrix::from_columns(
+            &(0..smooth.rank()).map(|k| flat(&|n| velocity(n, k))).collect::<Vec<DVector<f64>>>(),
+        );
+        // What a rotation about the base takes back is no bend. A straight stem cannot roll, hence the pseudo-inverse.
+        let inverse = (turns.transpose() * &turns).pseudo_inverse(1e-9).ok()?;
+        let moves = &moves - &turns * (inverse * (turns.transpose() * &moves));
+        let mut gram = moves.transpose() * &moves;
+        let ridge = RIDGE * gram.trace() / gram.nrows() as f64;
+        (0..gram.nrows()).for_each(|k| gram[(k, k)] += ridge);
+        let factor: Cholesky<f64, Dyn> = gram.cholesky()?;
+        Some(Self { smooth: smooth.clone(), factor: factor.l().transpose() })
+    }
+
+    /// Displacements of coefficients of the smooth basis.
+    pub(super) fn of_coefficients(&self, coefficients: &[f64]) -> DVector<f64> {
+        &self.factor * DVector::from_column_slice(coefficients)
+    }
+
+    /// The smooth basis itself as a basis of displacements: its prior.
+    pub(super) fn prior(&self) -> Result<Basis, BasisError> {
+        Basis::from_modes(DVector::zeros(self.factor.nrows()), &self.factor.transpose())
+    }
+
+    /// A basis of angles as one of displacements, as far as the smooth modes span it.
+    pub(super) fn of_basis(&self, angles: &Basis) -> Result<Basis, BasisError> {
+        let mean = self.of_coefficients(&self.smooth.project(angles.mean()));
+        let rows: Vec<_> = (0..angles.rank())
+            .map(|k| {
+                let mut one = vec![0.0; k + 1];
+                one[k] = 1.0;
+                (self.of_coefficients(&self.smooth.project(&angles.at(&one))) - &mean).transpose()
+            })
+            .collect();
+        Basis::from_modes(mean, &apart(&DMatrix::from_rows(&rows)))
+    }
+
+    /// A basis of displacements as one of angles: the same mean, the same covariance.
+    pub(super) fn basis_of_angles(&self, of_displacements: &Pca) -> Result<Basis, BasisError> {
+        let basis = &of_displacements.basis;
+        let angles = |y: DVector<f64>| {
+            let x = self.factor.solve_upper_triangular(&y).unwrap_or_else(|| DVector::zeros(y.len()));
+            self.smooth.at(x.as_slice())
+        };
+        let mean = angles(basis.mean().clone());
+        let rows: Vec<_> = (0..basis.rank())
+            .map(|k| {
+                (angles(basis.components().row(k).transpose() * basis.sigma()[k]) - self.smooth.mean()).transpose()
+            })
+            .collect();
+        Basis::from_modes(mean, &apart(&DMatrix::from_rows(&rows)))
+    }
+}
+
+/// Modes (rows) of the same covariance that are orthogonal, largest first: modes that are apart in one metric need not
+/// be so in another.
+fn apart(modes: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = (modes * modes.transpose()).symmetric_eigen();
+    let mut order: Vec<usize> = (0..modes.nrows()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    let rows: Vec<_> = order.iter().map(|k| upright(eigen.eigenvectors.column(*k).transpose() * modes)).collect();
+    DMatrix::from_rows(&rows)
+}
+
+/// A component with its sign fixed: its first angles that matter are positive.
+fn upright(mode: nalgebra::RowDVector<f64>) -> nalgebra::RowDVector<f64> {
+    let largest = mode.amax();
+    let sign = mode.iter().find(|x| x.abs() >= 0.5 * largest).map_or(1.0, |x| x.signum());
+    mode * sign
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learn::smooth::smooth;
+    use crate::species::generic;
+
+    #[test]
+    fn displacements_are_those_of_the_points_and_bases_survive_the_change_of_metric() {
+        let smooth = smooth(&generic("soybean").expect("listed").expect("valid")).expect("independent");
+        let displacement = Displacement::of_leaf(&smooth, Vec::new()).expect("blades move");
+        let still = smooth.leaf.grid(&Blade { beta: Vec::new(), gamma: Vec::new(), width: 1.0 }).points;
+        // A fold at the vein, small enough to be linear, with the best rotation about the base taken back.
+        let mut gamma = vec![0.0; smooth.leaf.deform.rank()];
+        gamma[14] = 0.001;
+        let bent = smooth.leaf.grid(&Blade { beta: Vec::new(), gamma: gamma.clone(), width: 1.0 }).points;
+        let moves: Vec<DVec3> = bent.iter().zip(&still).map(|(p, q)| *p - *q).collect();
+        let (mut inertia, mut turn) = (glam::DMat3::ZERO, DVec3::ZERO);
+        for (p, moved) in still.iter().zip(&moves) {
+            let outer = glam::DMat3::from_cols(*p * p.x, *p * p.y, *p * p.z);
+            inertia += glam::DMat3::from_diagonal(DVec3::splat(p.length_squared())) - outer;
+            turn += p.cross(*moved);
+        }
+        let turn = inertia.inverse() * turn;
+        let left = still.iter().zip(&moves).map(|(p, moved)| (*moved - turn.cross(*p)).length_squared());
+        let expected = (left.sum::<f64>() / still.len() as f64).sqrt();
+        let found = displacement.of_coefficients(&gamma).norm();
+        assert!((found / expected - 1.0).abs() < 0.01, "{found} against {expected}");
+
+        let rows = DMatrix::from_fn(6, gamma.len(), |i, k| ((i * 7 + k * 3) % 5) as f64 - 2.0);
+        let moved: Vec<_> =
+            rows.row_iter().map(|row| displacement.of_coefficients(row.transpose().as_slice()).transpose()).collect();
+        let pca = Pca::new(&DMatrix::from_rows(&moved), 4).expect("varies");
+        let again = displacement.of_basis(&displacement.basis_of_angles(&pca).expect("a basis")).expect("a basis");
+        assert!((again.mean() - pca.basis.mean()).amax() < 1e-6 * pca.basis.mean().amax().max(1.0));
+        let covariance = |b: &Basis| {
+            let modes = DMatrix::from_diagonal(b.sigma()) * b.components();
+            modes.tr_mul(&modes)
+        };
+        let (one, other) = (covariance(&again), covariance(&pca.basis));
+        assert!((&one - &other).amax() < 1e-6 * other.amax(), "{}", (one - other).amax());
+    }
+}
