@@ -55,7 +55,7 @@ pub(super) fn lessons(
 fn lesson(path: &Path, rich: &Species) -> Result<Result<Lesson, String>, CommandError> {
     let bytes = files::read(path)?;
     Ok(read(&bytes).and_then(|cloud| {
-        if cloud.labels.is_none() {
+        if cloud.labels.is_none() && cloud.organs.is_none() {
             return Lesson::of_leaf(&cloud.points, DVec3::Z, rich).map_err(|error| chain(&error));
         }
         let up = Up::Axis(DVec3::Z);
