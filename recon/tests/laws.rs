@@ -5,7 +5,7 @@ mod common;
 
 use common::{cases, random_plant, species};
 use demeter_frame::Pose;
-use demeter_recon::model::leaf::{self, Blade, COLUMNS, ROWS, VEIN, node};
+use demeter_recon::model::leaf::{self, Blade, COLUMNS, Lattice, ROWS, VEIN, node};
 use demeter_recon::model::stem::{self, BONES};
 use demeter_recon::model::{Detail, Form, Knots, OrganKind, PlantMesh, Species, forward};
 use glam::{DQuat, DVec2, DVec3};
@@ -153,12 +153,13 @@ proptest! {
     #[test]
     fn analytic_derivatives_are_those_of_finite_differences(
         name in names(), beta in coefficients(), gamma in coefficients(), width in 0.6..1.6_f64,
+        lattice in prop::sample::select(vec![Lattice::WHOLE, Lattice::every(2, 3)]),
     ) {
         const STEP: f64 = 1e-5;
         const TOLERANCE: f64 = 1e-7;
         let species = species(name);
         let at = blade(&species, &beta, &gamma, width);
-        let analytic = species.leaf.jacobian(&at);
+        let analytic = species.leaf.jacobian_on(&at, lattice);
         let (shapes, bends) = (at.beta.len(), at.gamma.len());
         prop_assert_eq!(analytic.coefficients, shapes + bends + 1);
         for k in 0..analytic.coefficients {
@@ -169,12 +170,12 @@ proptest! {
                     k if k < shapes + bends => blade.gamma[k - shapes] += by,
                     _ => blade.width *= by.exp(),
                 }
-                species.leaf.jacobian(&blade).points
+                species.leaf.points(&blade, lattice)
             };
             let (after, before) = (moved(STEP), moved(-STEP));
             for (n, (after, before)) in after.iter().zip(&before).enumerate() {
                 let finite = (*after - *before) / (2.0 * STEP);
-                let found = analytic.derivatives[n * analytic.coefficients + k];
+                let found = analytic.derivative(n, k);
                 prop_assert!(finite.distance(found) < TOLERANCE, "{name} point {n} by {k}: {finite} and {found}");
             }
         }
@@ -192,6 +193,22 @@ proptest! {
                 let found = analytic.derivatives[n * analytic.coefficients + k];
                 prop_assert!(finite.distance(found) < TOLERANCE, "{name} stem point {n} by {k}: {finite} and {found}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_lattice_takes_its_points_from_the_whole_grid() {
+    let species = species("tomato");
+    let at = blade(&species, &[1.0, -2.0, 0.5], &[0.7; 16], 1.0);
+    let whole = species.leaf.points(&at, Lattice::WHOLE);
+    for (along, across) in [(1, 1), (2, 3), (4, 7), (11, 21), (44, 21)] {
+        let lattice = Lattice::every(along, across);
+        let points = species.leaf.points(&at, lattice);
+        assert_eq!(points, species.leaf.jacobian_on(&at, lattice).points);
+        assert_eq!(points.len(), lattice.len());
+        for (row, column) in (0..lattice.rows()).flat_map(|i| (0..lattice.columns()).map(move |j| (i, j))) {
+            assert_eq!(points[lattice.node(row, column)], whole[node(row * along, column * across)]);
         }
     }
 }

@@ -10,6 +10,7 @@ mod error;
 mod hanger;
 mod leaf;
 mod leaflets;
+mod lone;
 mod orient;
 pub(crate) mod solver;
 mod stem;
@@ -20,6 +21,7 @@ pub use error::FitError;
 pub(crate) use error::{MIN_EXTENT, MIN_POINTS};
 use glam::{DQuat, DVec3};
 pub(crate) use leaf::fit as blade;
+pub use lone::{LoneBlade, lone_blade};
 pub(crate) use stem::median as median_of;
 
 use crate::cloud::thinned;

@@ -28,8 +28,8 @@ impl Displacement {
     pub(super) fn of_leaf(smooth: &Species, mean: Vec<f64>) -> Option<Self> {
         let blade = Blade { beta: Vec::new(), gamma: mean, width: 1.0 };
         let jacobian = smooth.leaf.jacobian(&blade);
-        let (first, stride) = (smooth.leaf.shape.rank(), jacobian.coefficients);
-        Self::of(&smooth.leaf.deform, &jacobian.points, |n, k| jacobian.derivatives[n * stride + first + k])
+        let first = smooth.leaf.shape.rank();
+        Self::of(&smooth.leaf.deform, &jacobian.points, |n, k| jacobian.derivative(n, first + k))
     }
 
     /// Of the species' stems.

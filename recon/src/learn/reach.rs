@@ -58,8 +58,8 @@ fn leaf_error(angles: &DVector<f64>, basis: &Basis, smooth: &Species) -> f64 {
         let mut model = smooth.leaf.clone();
         model.deform = deform.clone();
         let jacobian = model.jacobian(&Blade { beta: Vec::new(), gamma: gamma.to_vec(), width: 1.0 });
-        let (first, stride) = (model.shape.rank(), jacobian.coefficients);
-        (jacobian.points, move |n: usize, k: usize| jacobian.derivatives[n * stride + first + k])
+        let first = model.shape.rank();
+        (jacobian.points.clone(), move |n: usize, k: usize| jacobian.derivative(n, first + k))
     };
     let target = posed(&smooth.leaf.deform, &smooth.leaf.deform.project(angles)).0;
     error(&target, basis.project(angles), |gamma| posed(basis, gamma))

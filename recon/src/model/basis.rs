@@ -112,6 +112,23 @@ impl Basis {
         &self.mean + self.scaled.rows(0, k).tr_mul(&c)
     }
 
+    /// Output `n` at `coefficients` (in σ), counted as by [`Basis::at`].
+    #[must_use]
+    pub fn one(&self, n: usize, coefficients: &[f64]) -> f64 {
+        let k = self.rank().min(coefficients.len());
+        let (along, c) = (&self.derivative(n)[..k], &coefficients[..k]);
+        // Four sums at once: a single one would wait for each addition.
+        let ((along, along_rest), (c, c_rest)) = (along.as_chunks::<4>(), c.as_chunks::<4>());
+        let mut sums = [0.0; 4];
+        for (along, c) in along.iter().zip(c) {
+            for lane in 0..4 {
+                sums[lane] += along[lane] * c[lane];
+            }
+        }
+        let rest: f64 = along_rest.iter().zip(c_rest).map(|(along, c)| along * c).sum();
+        self.mean[n] + (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    }
+
     /// The least-squares coefficients (in σ) of an output: the projection on Φ.
     #[must_use]
     pub fn project(&self, output: &DVector<f64>) -> Vec<f64> {

@@ -1,10 +1,9 @@
 //! The leaf: a flat grid shaped by β, bent by joint angles γ (paper 3.1, eq. 4 and 5).
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use nalgebra::DVector;
 
 use super::basis::Basis;
-use super::chain::Joint;
+use super::chain::{Change, Joint};
 
 /// Rows of the control grid along the main vein, base (0) to tip (44): m_l1.
 pub const ROWS: usize = 45;
@@ -91,15 +90,83 @@ pub struct BladeGrid {
     pub gauge: DQuat,
 }
 
-/// The raw chain's control grid with its derivatives: the fitting form, before the gauge.
+/// Every so many rows and columns of the control grid; edges, base, tip and main vein always belong to it. The rows of
+/// side veins are chains of their own, so those that are left out cost nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lattice {
+    along: usize,
+    across: usize,
+}
+
+impl Lattice {
+    /// The whole control grid.
+    pub const WHOLE: Self = Self::every(1, 1);
+
+    /// Every `along`-th row and `across`-th column.
+    ///
+    /// # Panics
+    /// When `along` does not divide 44 or `across` does not divide 21; in a constant that is an error of the compiler.
+    #[must_use]
+    pub const fn every(along: usize, across: usize) -> Self {
+        assert!((ROWS - 1).is_multiple_of(along) && VEIN.is_multiple_of(across));
+        Self { along, across }
+    }
+
+    /// Rows, base and tip included.
+    #[must_use]
+    pub const fn rows(self) -> usize {
+        (ROWS - 1) / self.along + 1
+    }
+
+    /// Columns, both edges included; the main vein is the middle one.
+    #[must_use]
+    pub const fn columns(self) -> usize {
+        2 * (VEIN / self.across) + 1
+    }
+
+    /// Index of its node (row, column) in row-major storage.
+    #[must_use]
+    pub const fn node(self, row: usize, column: usize) -> usize {
+        row * self.columns() + column
+    }
+
+    /// How many nodes it has.
+    #[must_use]
+    pub const fn len(self) -> usize {
+        self.rows() * self.columns()
+    }
+
+    /// Never true: base and tip always belong to it.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        false
+    }
+}
+
+/// The raw chain's control points with their derivatives: the fitting form, before the gauge.
 #[derive(Clone, Debug)]
 pub struct BladeJacobian {
-    /// `[45*43]` row-major, base at the origin, first bone's rest frame the identity.
+    /// The lattice's nodes, row-major; base at the origin, first bone's rest frame the identity.
     pub points: Vec<DVec3>,
-    /// Derivatives of each point by β, then γ, then ln(width): `[45*43][K]` flattened.
-    pub derivatives: Vec<DVec3>,
-    /// K.
+    /// `[node][x, y, z][K]`.
+    derivatives: Vec<f64>,
+    /// K: the numbers of β and of γ, and one for ln(width).
     pub coefficients: usize,
+}
+
+impl BladeJacobian {
+    /// Derivatives of a point's x, y and z by β, then γ, then ln(width): K numbers each.
+    #[must_use]
+    pub fn axes(&self, node: usize) -> [&[f64]; 3] {
+        let k = self.coefficients;
+        [0, 1, 2].map(|axis| &self.derivatives[(3 * node + axis) * k..(3 * node + axis + 1) * k])
+    }
+
+    /// Derivative of a point by coefficient `k`.
+    #[must_use]
+    pub fn derivative(&self, node: usize, k: usize) -> DVec3 {
+        DVec3::from_array(self.axes(node).map(|axis| axis[k]))
+    }
 }
 
 impl LeafModel {
@@ -113,93 +180,115 @@ impl LeafModel {
     /// The blade's gauged control grid.
     #[must_use]
     pub fn grid(&self, blade: &Blade) -> BladeGrid {
-        let flat = self.flat(&blade.beta, blade.width);
-        let raw = bend(&flat, &self.deform.at(&blade.gamma), (0, 0), |_, _| DVec2::ZERO, |_, _| 0.0).0;
+        let raw = self.points(blade, Lattice::WHOLE);
         let gauge = gauge(&raw);
         BladeGrid { points: raw.iter().map(|p| gauge * *p).collect(), gauge }
     }
 
-    /// The raw (ungauged) grid and its analytic derivatives by β, γ and ln s_x.
+    /// The raw (ungauged) control points of a lattice.
+    #[must_use]
+    pub fn points(&self, blade: &Blade, lattice: Lattice) -> Vec<DVec3> {
+        let mut points = vec![DVec3::ZERO; lattice.len()];
+        self.bend(blade, lattice, (0, 0), |n, joint| points[n] = joint.point);
+        points
+    }
+
+    /// The raw (ungauged) control points and their analytic derivatives by β, γ and ln s_x.
     #[must_use]
     pub fn jacobian(&self, blade: &Blade) -> BladeJacobian {
+        self.jacobian_on(blade, Lattice::WHOLE)
+    }
+
+    /// The same of a lattice's control points.
+    #[must_use]
+    pub fn jacobian_on(&self, blade: &Blade, lattice: Lattice) -> BladeJacobian {
         let (shapes, bends) = (self.shape.rank(), self.deform.rank());
         let coefficients = shapes + bends + 1;
-        let flat = self.flat(&blade.beta, blade.width);
-        let angles = self.deform.at(&blade.gamma);
-        let dflat = |n: usize, k: usize| {
-            if k < shapes {
-                DVec2::new(self.shape.derivative(2 * n)[k] * blade.width, self.shape.derivative(2 * n + 1)[k])
-            } else {
-                DVec2::new(flat[n].x, 0.0)
+        let mut points = vec![DVec3::ZERO; lattice.len()];
+        let mut derivatives = vec![0.0; 3 * coefficients * lattice.len()];
+        self.bend(blade, lattice, (bends, shapes + 1), |n, joint| {
+            points[n] = joint.point;
+            let of_node = &mut derivatives[3 * coefficients * n..3 * coefficients * (n + 1)];
+            for (axis, cells) in of_node.chunks_exact_mut(coefficients).enumerate() {
+                let (swings, slides) = joint.velocity(axis);
+                cells[..shapes].copy_from_slice(&slides[..shapes]);
+                cells[shapes..shapes + bends].copy_from_slice(swings);
+                cells[shapes + bends] = slides[shapes];
             }
-        };
-        let dangle = |index: usize, k: usize| self.deform.derivative(index)[k];
-        let (points, derivatives) = bend(&flat, &angles, (shapes + 1, bends), dflat, dangle);
+        });
         BladeJacobian { points, derivatives, coefficients }
     }
-}
 
-/// Bends a flat grid: the main vein as one chain, each inner row as two chains that leave it (paper eq. 5).
-///
-/// `coefficients` counts those that change the flat grid (β, then ln s_x; `dflat` by node and coefficient) and those
-/// that change angles (γ; `dangle` by angle and coefficient). Returns points and their derivatives
-/// `[45*43][β, γ, ln s_x]`; with no coefficients there are none.
-fn bend(
-    flat: &[DVec2],
-    angles: &DVector<f64>,
-    coefficients: (usize, usize),
-    dflat: impl Fn(usize, usize) -> DVec2,
-    dangle: impl Fn(usize, usize) -> f64,
-) -> (Vec<DVec3>, Vec<DVec3>) {
-    let (slides, swings) = coefficients;
-    let mut points = vec![DVec3::ZERO; POINTS];
-    let mut derivatives = vec![DVec3::ZERO; POINTS * (slides + swings)];
-    let mut put = |n: usize, joint: &Joint| {
-        points[n] = joint.point;
-        let (shapes, width) = joint.slide.split_at(slides.saturating_sub(1));
-        let bends = joint.swing.iter().map(|(_, velocity)| velocity);
-        let cells = &mut derivatives[n * (slides + swings)..(n + 1) * (slides + swings)];
-        for (cell, velocity) in cells.iter_mut().zip(shapes.iter().chain(bends).chain(width)) {
-            *cell = *velocity;
-        }
-    };
-    let bone = |to: usize, from: usize| (flat[to] - flat[from]).extend(0.0);
-    let mut vein = Joint::at_origin(slides, swings);
-    let mut rib = vein.clone();
-    for j in 0..COLUMNS {
-        put(node(0, j), &vein);
-    }
-    for i in 1..ROWS {
-        let (to, from, q) = (node(i, VEIN), node(i - 1, VEIN), vein_angle(i));
-        vein.advance(
-            DVec3::new(angles[q], 0.0, angles[q + 1]),
-            bone(to, from),
-            |k| (dflat(to, k) - dflat(from, k)).extend(0.0),
-            |k| DVec3::new(dangle(q, k), 0.0, dangle(q + 1, k)),
-        );
-        put(to, &vein);
-        if i == ROWS - 1 {
-            // The tip row is one point.
-            for j in 0..COLUMNS {
-                put(node(i, j), &vein);
+    /// Bends the flat grid, the main vein as one chain, each inner row as two chains that leave it (paper eq. 5), and
+    /// shows each node of the lattice to `put`. Joints carry derivatives by γ and by β, ln s_x, or (0, 0) for none.
+    fn bend(
+        &self,
+        blade: &Blade,
+        lattice: Lattice,
+        (swings, slides): (usize, usize),
+        mut put: impl FnMut(usize, &Joint),
+    ) {
+        let flat = |n: usize| {
+            let of = |m: usize| self.shape.one(m, &blade.beta);
+            DVec3::new(of(2 * n) * blade.width, of(2 * n + 1), 0.0)
+        };
+        let mut dbone = [vec![0.0; slides], vec![0.0; slides]];
+        let mut advance = |joint: &mut Joint, axes: [DVec3; 2], q: usize, (to, from): (usize, usize), bone: DVec3| {
+            let angles = [self.deform.one(q, &blade.gamma), self.deform.one(q + 1, &blade.gamma)];
+            if slides == 0 {
+                joint.advance(axes, angles, bone, Change::default());
+                return;
             }
-            break;
+            for (axis, (cells, scale)) in dbone.iter_mut().zip([blade.width, 1.0]).enumerate() {
+                let (to, from) = (self.shape.derivative(2 * to + axis), self.shape.derivative(2 * from + axis));
+                for k in 0..to.len() {
+                    cells[k] = (to[k] - from[k]) * scale;
+                }
+            }
+            dbone[0][slides - 1] = bone.x;
+            let change = Change {
+                bone: [&dbone[0], &dbone[1]],
+                angles: [self.deform.derivative(q), self.deform.derivative(q + 1)],
+            };
+            joint.advance(axes, angles, bone, change);
+        };
+        let mut vein = Joint::at_origin(swings, slides);
+        for j in 0..lattice.columns() {
+            put(lattice.node(0, j), &vein);
         }
-        for side in Side::BOTH {
-            rib.clone_from(&vein);
-            for k in 1..=VEIN {
-                let (to, from, q) = (node(i, side.column(k)), node(i, side.column(k - 1)), side_angle(i, side, k));
-                rib.advance(
-                    DVec3::new(0.0, angles[q], angles[q + 1]),
-                    bone(to, from),
-                    |m| (dflat(to, m) - dflat(from, m)).extend(0.0),
-                    |m| DVec3::new(0.0, dangle(q, m), dangle(q + 1, m)),
-                );
-                put(to, &rib);
+        let mut last = flat(node(0, VEIN));
+        for i in 1..ROWS {
+            let (to, from) = (node(i, VEIN), node(i - 1, VEIN));
+            let here = flat(to);
+            advance(&mut vein, [DVec3::X, DVec3::Z], vein_angle(i), (to, from), here - last);
+            last = here;
+            if !i.is_multiple_of(lattice.along) {
+                continue;
+            }
+            let row = i / lattice.along;
+            if i == ROWS - 1 {
+                // The tip row is one point.
+                for j in 0..lattice.columns() {
+                    put(lattice.node(row, j), &vein);
+                }
+                break;
+            }
+            put(lattice.node(row, lattice.columns() / 2), &vein);
+            for side in Side::BOTH {
+                let mut rib = vein.clone();
+                let mut inner = here;
+                for k in 1..=VEIN {
+                    let (to, from) = (node(i, side.column(k)), node(i, side.column(k - 1)));
+                    let outer = flat(to);
+                    advance(&mut rib, [DVec3::Y, DVec3::Z], side_angle(i, side, k), (to, from), outer - inner);
+                    inner = outer;
+                    if k.is_multiple_of(lattice.across) {
+                        put(lattice.node(row, side.column(k) / lattice.across), &rib);
+                    }
+                }
             }
         }
     }
-    (points, derivatives)
 }
 
 /// The rotation that brings a bent grid (base at the origin) to the gauge of spec/demeter-model.md: tip on +y, mean

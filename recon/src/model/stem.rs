@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::basis::Basis;
-use super::chain::Joint;
+use super::chain::{Change, Joint};
 use super::leaf::frame_of;
 
 /// Control points of a stem.
@@ -63,19 +63,17 @@ impl StemModel {
     fn chain(&self, gamma: &[f64], coefficients: usize) -> (Vec<DVec3>, Vec<DQuat>, Vec<DVec3>) {
         let angles = self.deform.at(gamma);
         let bone = DVec3::Y / BONES as f64;
-        let mut joint = Joint::at_origin(0, coefficients);
-        let (mut points, mut frames) = (vec![joint.point], vec![joint.frame]);
+        let mut joint = Joint::at_origin(coefficients, 0);
+        let (mut points, mut frames) = (vec![joint.point], vec![DQuat::IDENTITY]);
         let mut derivatives = vec![DVec3::ZERO; coefficients];
         for q in (0..ANGLES).step_by(2) {
-            joint.advance(
-                DVec3::new(angles[q], 0.0, angles[q + 1]),
-                bone,
-                |_| DVec3::ZERO,
-                |k| DVec3::new(self.deform.derivative(q)[k], 0.0, self.deform.derivative(q + 1)[k]),
-            );
+            let change =
+                Change { angles: [self.deform.derivative(q), self.deform.derivative(q + 1)], ..Change::default() };
+            joint.advance([DVec3::X, DVec3::Z], [angles[q], angles[q + 1]], bone, change);
             points.push(joint.point);
-            frames.push(joint.frame);
-            derivatives.extend(joint.swing.iter().map(|(_, velocity)| *velocity));
+            frames.push(DQuat::from_mat3(&joint.frame).normalize());
+            let [x, y, z] = [0, 1, 2].map(|axis| joint.velocity(axis).0);
+            derivatives.extend((0..coefficients).map(|k| DVec3::new(x[k], y[k], z[k])));
         }
         (points, frames, derivatives)
     }

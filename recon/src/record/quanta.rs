@@ -26,12 +26,17 @@ impl Effects {
         let mean = Blade { beta: Vec::new(), gamma: Vec::new(), width: 1.0 };
         let leaf = species.leaf.jacobian(&mean);
         let gauge = species.leaf.grid(&mean).gauge;
-        let mut shifts = gauged_shifts(&leaf.points, &leaf.derivatives, leaf.coefficients, gauge);
+        let mut shifts = gauged_shifts(&leaf.points, |n, k| leaf.derivative(n, k), leaf.coefficients, gauge);
         let leaf_width = octaves(shifts.pop().unwrap_or(0.0));
         let roll = leaf.points.iter().map(|p| (gauge * *p).with_y(0.0).length_squared()).sum::<f64>();
         let leaf_gamma = shifts.split_off(species.leaf.shape.rank());
         let stem = species.stem.jacobian(&[]);
-        let bows = gauged_shifts(&stem.points, &stem.derivatives, stem.coefficients, stem::gauge(&stem.points));
+        let bows = gauged_shifts(
+            &stem.points,
+            |n, k| stem.derivatives[n * stem.coefficients + k],
+            stem.coefficients,
+            stem::gauge(&stem.points),
+        );
         let round = |shifts: Vec<f64>| shifts.into_iter().map(octaves).collect();
         Self {
             beta: round(shifts),
@@ -50,12 +55,17 @@ fn octaves(shift: f64) -> i32 {
 
 /// Root-mean-square shift of the points by each of `coefficients`, after the gauge has taken back what is rotation:
 /// the tip (the last point) goes back to the chord, and the roll to where the points move least.
-fn gauged_shifts(points: &[DVec3], derivatives: &[DVec3], coefficients: usize, gauge: DQuat) -> Vec<f64> {
+fn gauged_shifts(
+    points: &[DVec3],
+    derivative: impl Fn(usize, usize) -> DVec3,
+    coefficients: usize,
+    gauge: DQuat,
+) -> Vec<f64> {
     let points: Vec<DVec3> = points.iter().map(|p| gauge * *p).collect();
     let tip = points.len() - 1;
     (0..coefficients)
         .map(|k| {
-            let moved = |n: usize| gauge * derivatives[n * coefficients + k];
+            let moved = |n: usize| gauge * derivative(n, k);
             let chord = points[tip].y.max(1e-3);
             let back = DVec3::new(-moved(tip).z, 0.0, moved(tip).x) / chord;
             let shifts: Vec<DVec3> = points.iter().enumerate().map(|(n, p)| moved(n) + back.cross(*p)).collect();
@@ -103,9 +113,14 @@ mod tests {
             let leaf = species.leaf.jacobian(&mean);
             let gauge = species.leaf.grid(&mean).gauge;
             let stem = species.stem.jacobian(&[]);
-            let mut shifts = gauged_shifts(&leaf.points, &leaf.derivatives, leaf.coefficients, gauge);
+            let mut shifts = gauged_shifts(&leaf.points, |n, k| leaf.derivative(n, k), leaf.coefficients, gauge);
             let turn = stem::gauge(&stem.points);
-            shifts.extend(gauged_shifts(&stem.points, &stem.derivatives, stem.coefficients, turn));
+            shifts.extend(gauged_shifts(
+                &stem.points,
+                |n, k| stem.derivatives[n * stem.coefficients + k],
+                stem.coefficients,
+                turn,
+            ));
             for shift in shifts.into_iter().filter(|s| *s > 1e-6) {
                 let fraction = shift.log2().rem_euclid(1.0);
                 assert!((fraction - 0.5).abs() > 1e-6, "{name}: {shift}");

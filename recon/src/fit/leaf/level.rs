@@ -1,0 +1,67 @@
+//! The cost of a blade, linearised.
+
+use super::data::Data;
+use super::edges::Edges;
+use super::equations::{Loss, Pulls};
+use super::seen::Seen;
+use super::sheet::Sheet;
+use super::state::State;
+use crate::fit::solver::Normal;
+use crate::model::leaf::Lattice;
+use crate::model::{Habit, Species};
+
+/// Independent observations that a blade's points amount to: neighbours err together (a guess).
+const INDEPENDENT: f64 = 150.0;
+/// A node farther from every point than this many spacings of the points has no data beside it.
+pub(super) const BESIDE: f64 = 2.0;
+
+/// How closely the fit looks.
+pub(super) struct Level<'a> {
+    pub data: &'a Data,
+    pub species: &'a Species,
+    pub lattice: Lattice,
+    /// Standard deviation of the points about the surface, metres.
+    pub sigma: f64,
+    /// Where the edge should be; while it is not known, points beyond it pull.
+    pub edges: Option<Edges>,
+    /// The node nearest to each point when the level began.
+    pub nodes: Vec<usize>,
+    pub base_moves: bool,
+}
+
+impl Level<'_> {
+    pub(super) fn normal(&self, state: &State) -> Normal {
+        let jacobian = self.species.leaf.jacobian_on(&state.blade(), self.lattice);
+        let sheet = Sheet::new(jacobian.points.iter().map(|p| state.place(*p)).collect(), self.lattice);
+        let seen = Seen::of(sheet, self.data, Some(&self.nodes));
+        let sheet = &seen.sheet;
+        let mut pulls = Pulls::on(sheet.points.len());
+        // Data to surface: off the edge the whole miss counts, above the blade only its height does.
+        let share = INDEPENDENT / self.data.points.len() as f64;
+        for ((p, n), height) in self.data.points.iter().zip(&seen.nodes).zip(&seen.heights) {
+            if self.edges.is_none() && sheet.on_edge(*n) {
+                let gap = sheet.points[*n] - *p;
+                pulls.gap(*n, gap, Loss::huber(gap.length(), self.sigma).times(share));
+            } else {
+                pulls.height(*n, *height, Loss::huber(*height, self.sigma).times(share));
+            }
+        }
+        // Surface to data: beside data the height above them counts already, elsewhere all of the gap does.
+        let share = INDEPENDENT / sheet.areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        for (n, gap) in seen.gaps(self.data, BESIDE * self.data.spacing) {
+            pulls.gap(n, gap, Loss::huber(gap.length(), self.sigma).times(share * sheet.areas[n]));
+        }
+        if let Some(edges) = &self.edges {
+            edges.pull(sheet, &mut pulls);
+        }
+        let mut normal = pulls.linearise(state, sheet, &jacobian, self.base_moves);
+        let coefficients = State::COEFFICIENTS..State::COEFFICIENTS + jacobian.coefficients - 1;
+        for (i, c) in coefficients.clone().zip(state.beta.iter().chain(&state.gamma)) {
+            normal.prior(i, *c, 1.0);
+        }
+        // s_x is 1 outside grasses: a pull no data outweighs keeps the step at 0.
+        let weight = if self.species.habit == Habit::Grass { 1.0 } else { 1e12 };
+        normal.prior(coefficients.end, 0.0, weight);
+        normal
+    }
+}

@@ -1,0 +1,130 @@
+//! One blade alone: pose, size, shape and deformation by damped Gauss-Newton on both directions of the Chamfer
+//! distance, robustly and with priors on β and γ (paper eq. 7; stage 1 of spec/reconstruction.md).
+
+mod data;
+mod edges;
+mod equations;
+mod level;
+mod seen;
+mod sheet;
+mod starts;
+mod state;
+
+use std::cell::Cell;
+
+use glam::{DQuat, DVec3};
+
+use super::centreline::course;
+use super::solver::minimise;
+use super::stem::{mean, median};
+use crate::model::Species;
+use crate::model::leaf::{Blade, Lattice, gauge};
+use data::Data;
+use edges::Edges;
+use level::{BESIDE, Level};
+use seen::Seen;
+use state::State;
+
+/// Slices of a blade's course.
+const SLICES: usize = 14;
+/// Most points of one blade that steer the fit; more only slow it down.
+const MAX_POINTS: usize = 2_000;
+/// Points that bring it near.
+const FEW_POINTS: usize = 400;
+/// Nodes that bring it near, and nodes that finish it.
+const COARSE: Lattice = Lattice::every(4, 3);
+const FINE: Lattice = Lattice::every(2, 3);
+/// Standard deviation of a blade's points about the model while it is far, as a share of its length (a guess).
+const FAR: f64 = 0.01;
+/// Least one when it is near, as a share of its length: what a basis of a few dozen modes leaves (a guess).
+const NEAR: f64 = 0.002;
+/// With few points: how many starts go on, the nearest first, and for how many steps.
+const HEATS: [(usize, usize); 3] = [(usize::MAX, 2), (2, 4), (1, 5)];
+/// Rounds with all points, each of which finds the edge anew, and their steps.
+const ROUNDS: usize = 3;
+const STEPS: usize = 3;
+
+/// A fitted blade in the world.
+#[derive(Clone, Debug)]
+pub(crate) struct LeafFit {
+    /// Where the main vein starts, metres.
+    pub base: DVec3,
+    /// world_from_organ rotation, gauged.
+    pub rotation: DQuat,
+    /// Chord of the flat blade, metres.
+    pub length: f64,
+    pub blade: Blade,
+    /// Mean distance of the points to the surface, metres.
+    pub residual: f64,
+    /// Share of the surface with data beside it.
+    pub visible: f64,
+    pub converged: bool,
+}
+
+/// Fits a blade whose base is attached at `base`; `up` tells the upper side where the cloud cannot.
+pub(crate) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -> LeafFit {
+    let few = Data::thinned(points, FEW_POINTS);
+    let starts = starts::along(&course(&few.points, base, SLICES), &few.points, up, species);
+    finish(points, &few, starts.to_vec(), false, species)
+}
+
+/// Fits a blade that hangs on nothing known: its base is at either end of its course and may move.
+pub(super) fn alone(points: &[DVec3], up: DVec3, species: &Species) -> LeafFit {
+    let few = Data::thinned(points, FEW_POINTS);
+    let middle = few.points.iter().copied().sum::<DVec3>() / few.points.len().max(1) as f64;
+    let far = few.points.iter().max_by(|a, b| a.distance_squared(middle).total_cmp(&b.distance_squared(middle)));
+    let one = course(&few.points, far.copied().unwrap_or(middle), SLICES);
+    let other: Vec<DVec3> = one.iter().rev().copied().collect();
+    let starts = [one, other].iter().flat_map(|course| starts::along(course, &few.points, up, species)).collect();
+    finish(points, &few, starts, true, species)
+}
+
+/// Brings the starts near with few points, each time going on with the nearest, and finishes the last one.
+fn finish(points: &[DVec3], few: &Data, mut starts: Vec<State>, base_moves: bool, species: &Species) -> LeafFit {
+    let apply = |state: &State, step: &_| state.stepped(step, species);
+    // One scale for all starts, or their costs could not be compared.
+    let sigma = FAR * starts[0].metres();
+    for (most, steps) in HEATS {
+        starts.truncate(most);
+        let mut ranked: Vec<(f64, State)> = Vec::with_capacity(starts.len());
+        for mut state in starts {
+            let nodes = Seen::of(state.sheet(species, COARSE), few, None).nodes;
+            let level = Level { data: few, species, lattice: COARSE, sigma, edges: None, nodes, base_moves };
+            // The state that is kept is the cheapest that was tried.
+            let least = Cell::new(f64::INFINITY);
+            let normal = |state: &State| {
+                let normal = level.normal(state);
+                least.set(least.get().min(normal.cost));
+                normal
+            };
+            minimise(&mut state, steps, normal, apply);
+            ranked.push((least.get(), state));
+        }
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts = ranked.into_iter().map(|(_, state)| state).collect();
+    }
+    let mut state = starts.swap_remove(0);
+    let data = Data::thinned(points, MAX_POINTS);
+    let mut seen = Seen::of(state.sheet(species, FINE), &data, None);
+    let mut converged = false;
+    for _ in 0..ROUNDS {
+        let noise = 1.4826 * median(seen.heights.iter().map(|height| height.abs()).collect()).unwrap_or(0.0);
+        let sigma = noise.max(NEAR * state.metres());
+        let edges = Some(Edges::find(&seen.sheet, &seen.counts, noise, state.metres(), base_moves));
+        let level = Level { data: &data, species, lattice: FINE, sigma, edges, nodes: seen.nodes, base_moves };
+        converged = minimise(&mut state, STEPS, |state| level.normal(state), apply);
+        seen = Seen::of(state.sheet(species, FINE), &data, Some(&level.nodes));
+    }
+    let areas = &seen.sheet.areas;
+    let hidden: f64 = seen.gaps(&data, BESIDE * data.spacing).map(|(n, _)| areas[n]).sum();
+    let raw = species.leaf.points(&state.blade(), Lattice::WHOLE);
+    LeafFit {
+        base: state.base,
+        rotation: (state.rotation * gauge(&raw).inverse()).normalize(),
+        length: state.metres(),
+        residual: mean(seen.distances(&data)),
+        visible: 1.0 - hidden / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE),
+        blade: state.blade(),
+        converged,
+    }
+}
