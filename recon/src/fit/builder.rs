@@ -85,7 +85,7 @@ impl<'a> Builder<'a> {
 
     /// Puts a straight stem, half as thick as its parent, from a joint to the foot of what hangs there.
     fn bridge(&mut self, parent: usize, d: f64, joint: Similarity, foot: DVec3, radius: f64) -> usize {
-        let mut bridge = stem::fit_path(&[joint.translation, foot], &[], self.species);
+        let mut bridge = stem::fit_path(&[joint.translation, foot], self.species);
         bridge.radius = self.species.ranges.stem_radius.clamp(radius / 2.0);
         self.add_stem(Some(parent), d, joint, &bridge, None)
     }

@@ -14,6 +14,7 @@ mod lone;
 mod orient;
 pub(crate) mod solver;
 mod stem;
+mod tube;
 
 use builder::{Builder, Source};
 use demeter_frame::Pose;

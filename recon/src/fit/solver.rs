@@ -2,6 +2,29 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// What one miss weighs and costs.
+#[derive(Clone, Copy)]
+pub(super) struct Loss {
+    pub weight: f64,
+    pub cost: f64,
+}
+
+impl Loss {
+    /// Squared up to `sigma`, linear beyond (Huber); costs are in units of σ².
+    pub(super) fn huber(miss: f64, sigma: f64) -> Self {
+        let r = miss.abs() / sigma;
+        if r <= 1.0 {
+            Self { weight: 1.0 / (sigma * sigma), cost: r * r }
+        } else {
+            Self { weight: 1.0 / (r * sigma * sigma), cost: 2.0 * r - 1.0 }
+        }
+    }
+
+    pub(super) fn times(self, share: f64) -> Self {
+        Self { weight: self.weight * share, cost: self.cost * share }
+    }
+}
+
 /// Normal equations of a weighted least-squares problem at one state.
 #[derive(Clone, Debug)]
 pub(crate) struct Normal {
@@ -38,6 +61,11 @@ impl Normal {
         self.cost += weight * value * value;
         self.g[i] += weight * value;
         self.h[(i, i)] += weight;
+    }
+
+    /// The equations with the first parameters held.
+    pub(super) fn without_first(self, held: usize) -> Self {
+        Self { h: self.h.remove_rows(0, held).remove_columns(0, held), g: self.g.remove_rows(0, held), cost: self.cost }
     }
 
     /// The step that minimises the damped quadratic model, `None` when it has none.

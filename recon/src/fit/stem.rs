@@ -4,15 +4,25 @@ use glam::{DQuat, DVec3};
 use nalgebra::DVector;
 
 use super::centreline::{angles_along, course, length, resample};
-use super::solver::{Normal, minimise};
+use super::solver::{Loss, minimise};
+use super::tube::{Rows, Tube, TubeData};
+use crate::cloud::thinned;
 use crate::model::Species;
-use crate::model::stem::{POINTS, gauge};
+use crate::model::stem::{BONES, POINTS, gauge};
 
 /// Slices of a stem's course: as many as control points would leave slices empty on short stems.
 const SLICES: usize = 12;
-/// The distance to the axis below which this share of the points lies is the radius: on a clean scan every share says
-/// the same, and points of neighbouring organs lie outside.
+/// Most points that the course is found from.
+const COURSE_POINTS: usize = 600;
+/// The distance to the course below which this share of the points lies is the first guess of the radius: on a clean
+/// scan every share says the same, and points of neighbouring organs lie outside.
 const RADIUS_QUANTILE: f64 = 0.25;
+/// Standard deviation of a course's control points, as a share of its length (a guess).
+const COURSE_SIGMA: f64 = 0.005;
+/// Steps onto the course, and of each round onto the points.
+const STEPS: [usize; 2] = [8, 6];
+/// Rounds onto the points: each judges their noise anew.
+const ROUNDS: usize = 2;
 
 /// A fitted stem in the world; its base is where it was told to be.
 #[derive(Clone, Debug)]
@@ -25,75 +35,77 @@ pub(super) struct StemFit {
     pub gamma: Vec<f64>,
     /// Radius, metres.
     pub radius: f64,
-    /// Mean distance of the points to the tube's axis less its radius, metres.
+    /// Mean distance of the points to the tube, metres.
     pub residual: f64,
     pub converged: bool,
 }
 
-#[derive(Clone)]
-struct State {
-    rotation: DQuat,
-    log_length: f64,
-    gamma: Vec<f64>,
-}
-
 /// Fits a stem that starts at `base`.
 pub(super) fn fit(points: &[DVec3], base: DVec3, species: &Species) -> StemFit {
-    let path = resample(&course(points, base, SLICES), POINTS);
-    fit_path(&path, points, species)
+    let few = thinned(points, COURSE_POINTS);
+    let mut tube = along(&course(&few, base, SLICES), species);
+    let axis = Rows::of(&tube, species).axis;
+    let offsets = few.iter().map(|p| distance_to_path(*p, &axis)).collect();
+    let radius = quantile(offsets, RADIUS_QUANTILE).unwrap_or(0.0);
+    tube.log_radius = species.ranges.stem_radius.clamp(radius).ln();
+    let data = TubeData::new(points, tube.log_radius, false);
+    let mut converged = false;
+    for _ in 0..ROUNDS {
+        let sigma = data.noise(&tube, species);
+        let normal = |tube: &Tube| data.normal(tube, sigma, species).without_first(3);
+        converged = minimise(&mut tube, STEPS[1], normal, |tube, step| tube.stepped(step.as_slice(), &species.ranges));
+    }
+    let misses = data.misses(&tube, species);
+    StemFit { residual: mean(misses.iter().copied()), converged, ..StemFit::of(&tube, species) }
 }
 
-/// Fits a stem along a known path (a skeleton, or a bridge over a gap, which has no points of its own).
-pub(super) fn fit_path(path: &[DVec3], points: &[DVec3], species: &Species) -> StemFit {
+/// Fits a stem as thin as can be along a known path: a bridge over a gap, which has no points of its own.
+pub(super) fn fit_path(path: &[DVec3], species: &Species) -> StemFit {
+    StemFit::of(&along(path, species), species)
+}
+
+impl StemFit {
+    fn of(tube: &Tube, species: &Species) -> Self {
+        let raw = species.stem.jacobian(&tube.gamma).points;
+        Self {
+            rotation: (tube.rotation * gauge(&raw).inverse()).normalize(),
+            length: tube.metres(),
+            gamma: tube.gamma.clone(),
+            radius: tube.radius(),
+            residual: 0.0,
+            converged: true,
+        }
+    }
+}
+
+/// The thinnest tube along a path.
+fn along(path: &[DVec3], species: &Species) -> Tube {
     let ranges = &species.ranges;
     let target = resample(path, POINTS);
-    let base = target[0];
-    let first = DQuat::from_rotation_arc(DVec3::Y, (target[1] - base).normalize_or(DVec3::Z));
+    let first = DQuat::from_rotation_arc(DVec3::Y, (target[1] - target[0]).normalize_or(DVec3::Z));
     let angles = DVector::from_vec(angles_along(&target, first));
     let metres = ranges.stem_length.clamp(length(&target));
-    let mut state =
-        State { rotation: first, log_length: metres.ln(), gamma: clipped(species.stem.deform.project(&angles)) };
-    let bends = species.stem.deform.rank();
-    // The bends' prior: 1 σ may cost as much as missing every control point by 0.5 % of the length.
-    let prior = (0.005 * metres).powi(2);
-    let converged = minimise(
-        &mut state,
-        12,
-        |state| {
-            let jacobian = species.stem.jacobian(&state.gamma);
-            let s = state.log_length.exp();
-            let mut normal = Normal::new(4 + bends);
-            for (n, goal) in target.iter().enumerate().skip(1) {
-                let at = state.rotation * (jacobian.points[n] * s);
-                let miss = base + at - *goal;
-                let columns: Vec<DVec3> =
-                    (0..bends).map(|k| state.rotation * (jacobian.derivatives[n * bends + k] * s)).collect();
-                for axis in DVec3::AXES {
-                    let turn = at.cross(axis);
-                    let mut row = vec![turn.x, turn.y, turn.z, at.dot(axis)];
-                    row.extend(columns.iter().map(|c| c.dot(axis)));
-                    normal.add(miss.dot(axis), &row, 1.0 / POINTS as f64);
-                }
+    let mut tube = Tube {
+        base: target[0],
+        rotation: first,
+        log_length: metres.ln(),
+        gamma: clipped(species.stem.deform.project(&angles)),
+        log_radius: ranges.stem_radius.min.ln(),
+    };
+    let loss = Loss { weight: (COURSE_SIGMA * metres).powi(-2), cost: 0.0 };
+    let normal = |tube: &Tube| {
+        let mut rows = Rows::of(tube, species);
+        for bone in 0..BONES {
+            let miss = rows.place(bone, 1.0) - target[bone + 1];
+            for axis in DVec3::AXES {
+                let miss = miss.dot(axis);
+                rows.pull((bone, 1.0), axis, miss, 0.0, Loss { cost: loss.weight * miss * miss, ..loss });
             }
-            for (k, c) in state.gamma.iter().enumerate() {
-                normal.prior(4 + k, *c, prior / POINTS as f64);
-            }
-            normal
-        },
-        |state, step| State {
-            rotation: (DQuat::from_scaled_axis(DVec3::new(step[0], step[1], step[2])) * state.rotation).normalize(),
-            log_length: (state.log_length + step[3]).clamp(ranges.stem_length.min.ln(), ranges.stem_length.max.ln()),
-            gamma: clipped(state.gamma.iter().enumerate().map(|(k, c)| c + step[4 + k]).collect()),
-        },
-    );
-    let s = state.log_length.exp();
-    let raw = species.stem.jacobian(&state.gamma).points;
-    let axis: Vec<DVec3> = raw.iter().map(|p| base + state.rotation * (*p * s)).collect();
-    let offsets: Vec<f64> = points.iter().map(|p| distance_to_path(*p, &axis)).collect();
-    let radius = ranges.stem_radius.clamp(quantile(offsets.clone(), RADIUS_QUANTILE).unwrap_or(ranges.stem_radius.min));
-    let residual = mean(offsets.iter().map(|d| (d - radius).abs()));
-    let rotation = (state.rotation * gauge(&raw).inverse()).normalize();
-    StemFit { rotation, length: s, gamma: state.gamma, radius, residual, converged }
+        }
+        rows.finish(tube.log_radius).without_first(3)
+    };
+    minimise(&mut tube, STEPS[0], normal, |tube, step| tube.stepped(step.as_slice(), ranges));
+    tube
 }
 
 /// Coefficients inside the model: |c| <= 3 σ.
@@ -118,7 +130,8 @@ pub(crate) fn median(x: Vec<f64>) -> Option<f64> {
     quantile(x, 0.5)
 }
 
-fn quantile(mut x: Vec<f64>, share: f64) -> Option<f64> {
+/// The value that this share of the others lies below, `None` of nothing.
+pub(super) fn quantile(mut x: Vec<f64>, share: f64) -> Option<f64> {
     x.sort_by(f64::total_cmp);
     x.get((x.len() as f64 * share) as usize).copied()
 }

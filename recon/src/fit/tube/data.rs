@@ -1,0 +1,131 @@
+//! What a stem's points say of a tube: they lie on its surface, so that half of it seen from one side, or a few rows
+//! along it, are enough to find its axis and its radius.
+
+use glam::DVec3;
+
+use super::{Rows, Tube};
+use crate::cloud::thinned;
+use crate::fit::solver::{Loss, Normal};
+use crate::fit::stem::{median, nearest_on, quantile};
+use crate::model::Species;
+use crate::model::stem::{BONES, POINTS};
+use crate::nearest::{Nearest, Neighbour};
+
+/// Most points of one stem that steer it.
+const MAX_POINTS: usize = 400;
+/// Independent observations that a stem's points amount to: neighbours err together (a guess).
+const INDEPENDENT: f64 = 100.0;
+/// Shares of the points nearest to an end of a stem. Where points are even, the end is as far before the first as the
+/// second is behind it, which resists strays and noise as the outermost point does not.
+const END_SHARES: [f64; 2] = [0.03, 0.06];
+/// Least standard deviation of points about a tube, as a share of its length: stems are not quite round (a guess).
+const NEAR: f64 = 0.0005;
+/// Points within this many times their spacing of the surface lie beside it.
+const BESIDE: f64 = 2.0;
+
+/// A stem's points, prepared once.
+pub(in crate::fit) struct TubeData {
+    points: Vec<DVec3>,
+    search: Nearest,
+    /// Mean distance to the tenth neighbour or so: what one cannot see between, metres.
+    spacing: f64,
+    /// First guess of the radius, ln metres.
+    log_radius: f64,
+    /// Whether the stem's base is where its points begin; else it is inside its parent.
+    is_main: bool,
+}
+
+/// Where a point lies along a tube.
+struct Beside {
+    bone: usize,
+    t: f64,
+    /// From the point to the axis.
+    off: DVec3,
+    /// Metres from the base along the axis, beyond the ends too.
+    along: f64,
+}
+
+impl TubeData {
+    pub(in crate::fit) fn new(points: &[DVec3], log_radius: f64, is_main: bool) -> Self {
+        let points = thinned(points, MAX_POINTS);
+        let search = Nearest::of(&points);
+        let apart = |p: &DVec3| search.k(*p, 8).last().map(Neighbour::distance);
+        let spacing = median(points.iter().step_by(5).filter_map(apart).collect()).unwrap_or(0.0).max(1e-6);
+        Self { points, search, spacing, log_radius, is_main }
+    }
+
+    fn beside<'a>(&'a self, rows: &'a Rows<'_>) -> impl Iterator<Item = Beside> + 'a {
+        self.points.iter().map(|p| {
+            let mut best = Beside { bone: 0, t: 0.0, off: DVec3::INFINITY, along: 0.0 };
+            for bone in 0..BONES {
+                let (t, at) = nearest_on(*p, rows.axis[bone], rows.axis[bone + 1]);
+                if at.distance_squared(*p) < best.off.length_squared() {
+                    best = Beside { bone, t, off: at - *p, along: 0.0 };
+                }
+            }
+            best.along = rows.along(best.bone, best.t) - best.off.dot(rows.direction(best.bone));
+            best
+        })
+    }
+
+    /// Distances of the points from the tube's surface, metres; those beyond its ends are left out.
+    pub(in crate::fit) fn misses(&self, tube: &Tube, species: &Species) -> Vec<f64> {
+        let rows = Rows::of(tube, species);
+        let inside = self.beside(&rows).filter(|b| (0.0..=tube.metres()).contains(&b.along));
+        inside.map(|b| (b.off.length() - tube.radius()).abs()).collect()
+    }
+
+    /// Standard deviation of the points about the tube, metres.
+    pub(in crate::fit) fn noise(&self, tube: &Tube, species: &Species) -> f64 {
+        // 1.4826 median deviations are one standard deviation of a normal distribution.
+        let noise = 1.4826 * median(self.misses(tube, species)).unwrap_or(0.0);
+        noise.max(NEAR * tube.metres())
+    }
+
+    /// The normal equations at a tube, in units of `sigma`.
+    pub(in crate::fit) fn normal(&self, tube: &Tube, sigma: f64, species: &Species) -> Normal {
+        let mut rows = Rows::of(tube, species);
+        let beside: Vec<Beside> = self.beside(&rows).collect();
+        let radius = tube.radius();
+        let share = INDEPENDENT / self.points.len().max(1) as f64;
+        for b in &beside {
+            let distance = b.off.length();
+            // A point on the axis pulls nowhere; beyond the ends it says where they are, below.
+            if distance > 0.0 && (0.0..=tube.metres()).contains(&b.along) {
+                let miss = distance - radius;
+                rows.pull((b.bone, b.t), b.off / distance, miss, -radius, Loss::huber(miss, sigma).times(share));
+            }
+        }
+        let share = INDEPENDENT / POINTS as f64;
+        let along: Vec<f64> = beside.iter().map(|b| b.along).collect();
+        let mut end = |bone: usize, t: f64, miss: f64| {
+            let sigma = sigma.max(self.spacing / 2.0);
+            let direction = rows.direction(bone);
+            rows.pull((bone, t), direction, miss, 0.0, Loss::huber(miss, sigma).times(share));
+        };
+        end(BONES - 1, 1.0, tube.metres() + first(along.iter().map(|x| -x)));
+        if self.is_main {
+            end(0, 0.0, -first(along.into_iter()));
+        }
+        // The axis stays where points are beside it; the radius is no matter here, so that gaps do not swell stems.
+        let reach = self.log_radius.exp() + BESIDE * self.spacing;
+        for bone in 0..BONES - 1 {
+            let at = rows.place(bone, 1.0);
+            let Some(found) = self.search.one(at) else { continue };
+            let miss = found.distance() - reach;
+            if miss > 0.0 {
+                let direction = (at - self.points[found.index]) / found.distance();
+                rows.pull((bone, 1.0), direction, miss, 0.0, Loss::huber(miss, sigma).times(share));
+            }
+        }
+        rows.finish(self.log_radius)
+    }
+}
+
+/// Where points begin, from how far along each is.
+fn first(along: impl Iterator<Item = f64>) -> f64 {
+    let along: Vec<f64> = along.collect();
+    let least = along.iter().copied().fold(f64::INFINITY, f64::min);
+    let [near, far] = END_SHARES.map(|share| quantile(along.clone(), share).unwrap_or(0.0));
+    (2.0 * near - far).max(least)
+}
