@@ -49,14 +49,26 @@ pub(super) fn fit(points: &[DVec3], base: DVec3, species: &Species) -> StemFit {
     let radius = quantile(offsets, RADIUS_QUANTILE).unwrap_or(0.0);
     tube.log_radius = species.ranges.stem_radius.clamp(radius).ln();
     let data = TubeData::new(points, tube.log_radius, false);
-    let mut converged = false;
-    for _ in 0..ROUNDS {
-        let sigma = data.noise(&tube, species);
-        let normal = |tube: &Tube| data.normal(tube, sigma, species).without_first(3);
-        converged = minimise(&mut tube, STEPS[1], normal, |tube, step| tube.stepped(step.as_slice(), &species.ranges));
+    let mut thin = tube.clone();
+    let mut converged = onto(&mut tube, &data, species);
+    let data = data.with_radius_held();
+    let thin_converged = onto(&mut thin, &data, species);
+    if data.chamfer(&thin, species) < data.chamfer(&tube, species) {
+        (tube, converged) = (thin, thin_converged);
     }
     let misses = data.misses(&tube, species);
     StemFit { residual: mean(misses.iter().copied()), converged, ..StemFit::of(&tube, species) }
+}
+
+/// Moves a tube onto its points; true when that converged.
+fn onto(tube: &mut Tube, data: &TubeData, species: &Species) -> bool {
+    let mut converged = false;
+    for _ in 0..ROUNDS {
+        let sigma = data.noise(tube, species);
+        let normal = |tube: &Tube| data.normal(tube, sigma, species).without_first(3);
+        converged = minimise(tube, STEPS[1], normal, |tube, step| tube.stepped(step.as_slice(), &species.ranges));
+    }
+    converged
 }
 
 /// Fits a stem as thin as can be along a known path: a bridge over a gap, which has no points of its own.
@@ -102,7 +114,7 @@ fn along(path: &[DVec3], species: &Species) -> Tube {
                 rows.pull((bone, 1.0), axis, miss, 0.0, Loss { cost: loss.weight * miss * miss, ..loss });
             }
         }
-        rows.finish(tube.log_radius).without_first(3)
+        rows.finish(tube.log_radius, 1.0).without_first(3)
     };
     minimise(&mut tube, STEPS[0], normal, |tube, step| tube.stepped(step.as_slice(), ranges));
     tube

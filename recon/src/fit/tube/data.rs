@@ -1,12 +1,14 @@
 //! What a stem's points say of a tube: they lie on its surface, so that half of it seen from one side, or a few rows
 //! along it, are enough to find its axis and its radius.
 
-use glam::DVec3;
+use std::f64::consts::TAU;
+
+use glam::{DQuat, DVec3};
 
 use super::{Rows, Tube};
 use crate::cloud::thinned;
 use crate::fit::solver::{Loss, Normal};
-use crate::fit::stem::{median, nearest_on, quantile};
+use crate::fit::stem::{mean, median, nearest_on, quantile};
 use crate::model::Species;
 use crate::model::stem::{BONES, POINTS};
 use crate::nearest::{Nearest, Neighbour};
@@ -20,17 +22,21 @@ const INDEPENDENT: f64 = 100.0;
 const END_SHARES: [f64; 2] = [0.03, 0.06];
 /// Least standard deviation of points about a tube, as a share of its length: stems are not quite round (a guess).
 const NEAR: f64 = 0.0005;
+/// Directions about the axis in which a tube's surface looks for points.
+const SIDES: usize = 8;
 /// Points within this many times their spacing of the surface lie beside it.
-const BESIDE: f64 = 2.0;
+const BESIDE: f64 = 3.0;
 
 /// A stem's points, prepared once.
 pub(in crate::fit) struct TubeData {
     points: Vec<DVec3>,
     search: Nearest,
-    /// Mean distance to the tenth neighbour or so: what one cannot see between, metres.
+    /// Distance to the third neighbour (stems of sparse scans are single rows), metres: what one cannot see between.
     spacing: f64,
     /// First guess of the radius, ln metres.
     log_radius: f64,
+    /// How firmly the radius is held to the guess: 1 for a guess that may be wrong e times.
+    stiffness: f64,
     /// Whether the stem's base is where its points begin; else it is inside its parent.
     is_main: bool,
 }
@@ -49,12 +55,34 @@ impl TubeData {
     pub(in crate::fit) fn new(points: &[DVec3], log_radius: f64, is_main: bool) -> Self {
         let points = thinned(points, MAX_POINTS);
         let search = Nearest::of(&points);
-        let apart = |p: &DVec3| search.k(*p, 8).last().map(Neighbour::distance);
+        let apart = |p: &DVec3| search.k(*p, 4).last().map(Neighbour::distance);
         let spacing = median(points.iter().step_by(5).filter_map(apart).collect()).unwrap_or(0.0).max(1e-6);
-        Self { points, search, spacing, log_radius, is_main }
+        Self { points, search, spacing, log_radius, stiffness: 1.0, is_main }
     }
 
-    fn beside<'a>(&'a self, rows: &'a Rows<'_>) -> impl Iterator<Item = Beside> + 'a {
+    /// The same with the radius as first guessed, whatever the points say.
+    pub(in crate::fit) fn with_radius_held(self) -> Self {
+        Self { stiffness: 1e9, ..self }
+    }
+
+    /// Mean distance of the points from the surface and half that of the surface from the points, metres: it tells a
+    /// tube seen from one side, half of whose surface has no points, from a strip of noise beside too wide a tube.
+    pub(in crate::fit) fn chamfer(&self, tube: &Tube, species: &Species) -> f64 {
+        let rows = Rows::of(tube, species);
+        let to_surface = mean(self.beside(&rows).map(|b| (b.off.length() - tube.radius()).abs()));
+        let ring = |bone: usize| {
+            let (at, along) = (rows.place(bone, 0.5), rows.direction(bone));
+            let side =
+                (tube.rotation * DVec3::X).reject_from_normalized(along).normalize_or(along.any_orthonormal_vector());
+            let turn = move |k: usize| DQuat::from_axis_angle(along, TAU * k as f64 / SIDES as f64);
+            (0..SIDES).map(move |k| at + turn(k) * side * tube.radius())
+        };
+        let surface: Vec<DVec3> = (0..BONES).flat_map(ring).collect();
+        let to_points = |p: &DVec3| self.search.one(*p).map_or(0.0, |n| n.distance());
+        to_surface + mean(surface.iter().map(to_points)) / 2.0
+    }
+
+    fn beside<'a>(&'a self, rows: &'a Rows<'_>) -> impl ExactSizeIterator<Item = Beside> + 'a {
         self.points.iter().map(|p| {
             let mut best = Beside { bone: 0, t: 0.0, off: DVec3::INFINITY, along: 0.0 };
             for bone in 0..BONES {
@@ -118,7 +146,7 @@ impl TubeData {
                 rows.pull((bone, 1.0), direction, miss, 0.0, Loss::huber(miss, sigma).times(share));
             }
         }
-        rows.finish(self.log_radius)
+        rows.finish(self.log_radius, self.stiffness)
     }
 }
 

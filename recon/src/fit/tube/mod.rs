@@ -112,12 +112,12 @@ impl<'a> Rows<'a> {
         &self.row
     }
 
-    /// The normal equations with the priors: one σ of a bend counts 1, a radius e times `log_radius` too.
-    pub(super) fn finish(mut self, log_radius: f64) -> Normal {
+    /// The normal equations with the priors: one σ of a bend counts 1, a radius e times `log_radius` as `stiffness` says.
+    pub(super) fn finish(mut self, log_radius: f64, stiffness: f64) -> Normal {
         for (k, c) in self.tube.gamma.iter().enumerate() {
             self.normal.prior(Tube::POSE + k, *c, 1.0);
         }
-        self.normal.prior(self.row.len() - 1, self.tube.log_radius - log_radius, 1.0);
+        self.normal.prior(self.row.len() - 1, self.tube.log_radius - log_radius, stiffness);
         self.normal
     }
 

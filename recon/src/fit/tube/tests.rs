@@ -82,7 +82,7 @@ fn a_single_row_of_points_is_a_thin_stem() {
     let tube = bent(&species, &[1.0, 0.5]);
     let row = Rows::of(&tube, &species).axis;
     let (off, radius) = fitted(&tube, &species, &row);
-    assert!(off < 0.001 && radius < 0.001, "off {off}, radius {radius}");
+    assert!(off < 0.002 && radius < 0.001, "off {off}, radius {radius}");
 }
 
 proptest! {
