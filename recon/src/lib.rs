@@ -6,6 +6,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod axes;
+pub mod baseline;
 pub mod cloud;
 pub mod export;
 pub mod fit;

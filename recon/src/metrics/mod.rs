@@ -5,5 +5,5 @@ mod chamfer;
 mod parents;
 
 pub use agreement::{Agreement, Pair, quantile};
-pub use chamfer::{Chamfer, SURFACE_SAMPLES, chamfer, sample_surface};
+pub use chamfer::{Chamfer, SURFACE_SAMPLES, chamfer, rough_chamfer, sample_surface};
 pub use parents::{Parents, right_parents};

@@ -9,9 +9,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
+mod baselines;
 mod clouds;
 mod fit;
 mod table;
+mod topology;
 mod traits;
 mod truth;
 
@@ -26,6 +28,8 @@ pub struct Args {
 enum Which {
     /// Chamfer distance and bytes of whole plants, with labels and without, beside baselines.
     Fit(fit::Args),
+    /// Share of organs with the right parent.
+    Topology(topology::Args),
     /// Traits of the decoded record against a generator's truth.
     Traits(traits::Args),
 }
@@ -37,6 +41,7 @@ enum Which {
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let table = match &args.table {
         Which::Fit(args) => fit::table(args)?,
+        Which::Topology(args) => topology::table(args)?,
         Which::Traits(args) => traits::table(args)?,
     };
     if output.json {
