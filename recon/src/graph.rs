@@ -181,42 +181,57 @@ pub struct Branch {
     pub members: Vec<usize>,
 }
 
-/// The level-set skeleton of a cloud: connected pieces of equal distance from `base` become nodes, nodes become
-/// paths. `step` is the thickness of a level in metres. The trunk is the path that `prefer` scores highest by its end
-/// node's (centre, distance from the base); the rest are taken longest first. Parents stand before children.
-#[must_use]
-pub fn skeleton(
-    points: &[DVec3],
-    graph: &CloudGraph,
-    base: usize,
-    step: f64,
-    prefer: impl Fn(DVec3, f64) -> f64,
-) -> Vec<Branch> {
-    let distance = graph.distances(&[base]);
-    let level = |i: usize| (distance[i] / step) as u32;
-    let sets = pieces_by_level(graph, points.len(), &level);
-    let mut set_of = vec![0usize; points.len()];
-    for (k, set) in sets.iter().enumerate() {
-        for i in set {
-            set_of[*i] = k;
-        }
-    }
-    let centres: Vec<DVec3> =
-        sets.iter().map(|set| set.iter().map(|i| points[*i]).sum::<DVec3>() / set.len() as f64).collect();
-    // A set's parent is the set of the level below that holds most of its edges.
-    let parent: Vec<Option<usize>> = sets
-        .iter()
-        .map(|set| {
-            let mut votes = BTreeMap::new();
-            for j in set.iter().flat_map(|i| graph.neighbours(*i).map(move |j| (*i, j))) {
-                if distance[j.1] < distance[j.0] && level(j.1) < level(j.0) {
-                    *votes.entry(set_of[j.1]).or_insert(0usize) += 1;
-                }
+/// The level-set skeleton of a cloud: connected pieces of equal distance from a base become nodes of a tree, parents
+/// before children.
+#[derive(Clone, Debug)]
+pub struct Skeleton {
+    /// Points of each node.
+    pub sets: Vec<Vec<usize>>,
+    /// Mean of each node's points, metres.
+    pub centres: Vec<DVec3>,
+    /// Parent of each node, `None` for the one that holds the base.
+    pub parent: Vec<Option<usize>>,
+    /// Distance of each node from the base along the cloud, metres.
+    pub distance: Vec<f64>,
+}
+
+impl Skeleton {
+    /// The skeleton from the point `base` on; `step` is the thickness of a level in metres.
+    #[must_use]
+    pub fn of(points: &[DVec3], graph: &CloudGraph, base: usize, step: f64) -> Self {
+        let distance = graph.distances(&[base]);
+        let level = |i: usize| (distance[i] / step) as u32;
+        let sets = pieces_by_level(graph, points.len(), &level);
+        let mut set_of = vec![0usize; points.len()];
+        for (k, set) in sets.iter().enumerate() {
+            for i in set {
+                set_of[*i] = k;
             }
-            votes.into_iter().max_by_key(|(k, n)| (*n, Reverse(*k))).map(|(k, _)| k)
-        })
-        .collect();
-    paths(&sets, &centres, &parent, |k| prefer(centres[k], distance[sets[k][0]]))
+        }
+        let centres = sets.iter().map(|set| set.iter().map(|i| points[*i]).sum::<DVec3>() / set.len() as f64).collect();
+        // A set's parent is the set of the level below that holds most of its edges.
+        let parent = sets
+            .iter()
+            .map(|set| {
+                let mut votes = BTreeMap::new();
+                for j in set.iter().flat_map(|i| graph.neighbours(*i).map(move |j| (*i, j))) {
+                    if distance[j.1] < distance[j.0] && level(j.1) < level(j.0) {
+                        *votes.entry(set_of[j.1]).or_insert(0usize) += 1;
+                    }
+                }
+                votes.into_iter().max_by_key(|(k, n)| (*n, Reverse(*k))).map(|(k, _)| k)
+            })
+            .collect();
+        let distance = sets.iter().map(|set| distance[set[0]]).collect();
+        Self { sets, centres, parent, distance }
+    }
+
+    /// Divides the skeleton into paths. The trunk is the one that `prefer` scores highest by its end node's (centre,
+    /// distance from the base); the rest are taken longest first. Parents stand before children.
+    #[must_use]
+    pub fn branches(&self, prefer: impl Fn(DVec3, f64) -> f64) -> Vec<Branch> {
+        paths(&self.sets, &self.centres, &self.parent, |k| prefer(self.centres[k], self.distance[k]))
+    }
 }
 
 fn pieces_by_level(graph: &CloudGraph, count: usize, level: &impl Fn(usize) -> u32) -> Vec<Vec<usize>> {

@@ -5,8 +5,8 @@ use demeter_recon::cloud::{PointCloud, PointOrgan};
 use demeter_recon::export::cloud_to_ply;
 use demeter_recon::model::{OrganKind, Plant, Species};
 use demeter_recon::segment::{Labels, SegmentError, Segmented, Up, segment};
-use demeter_recon::species;
 use demeter_recon::world::{LabelledCloud, grow, labelled_cloud, seeded};
+use demeter_recon::{species, tree};
 use glam::{DMat3, DVec3};
 
 /// A grown plant as 6,000 points with half a millimetre of noise.
@@ -73,4 +73,80 @@ fn organs_apart_stay_as_they_are() {
         let refused = segment(&wrong, species.habit, Labels::Auto, Up::Axis(DVec3::Z));
         assert_eq!(refused, Err(SegmentError::Kinds { organ: number }));
     }
+}
+
+/// Points in common over points in either, of two ascending lists.
+fn overlap(a: &[u32], b: &[u32]) -> f64 {
+    let common = a.iter().filter(|i| b.binary_search(i).is_ok()).count();
+    common as f64 / (a.len() + b.len() - common) as f64
+}
+
+#[test]
+fn organs_apart_find_their_parents() {
+    let (mut right, mut all) = (0, 0);
+    for (name, age, seed) in [("soybean", 0.3, 1), ("soybean", 0.5, 2), ("tomato", 0.4, 3), ("maize", 0.5, 4)] {
+        let (species, plant, made) = grown(name, age, seed);
+        let found = divided(&apart(&plant, &made), &species, Labels::Auto, Up::Axis(DVec3::Z));
+        let tree = tree::build(found.organs).unwrap();
+        let number = |k: usize| made.organ[tree.organs[k].source[0] as usize] as usize;
+        for k in 1..tree.organs.len() {
+            all += 1;
+            right += usize::from(tree.parent[k].map(number) == plant.organs[number(k)].parent);
+        }
+    }
+    eprintln!("{right} of {all} parents are right");
+    assert!(right * 100 >= all * 95, "{right} of {all}");
+}
+
+#[test]
+fn stems_under_one_label_come_apart() {
+    for (seed, age) in [(1, 0.3), (2, 0.45), (5, 0.6)] {
+        let (species, plant, made) = grown("soybean", age, seed);
+        let found = divided(&made.cloud, &species, Labels::Own, Up::Axis(DVec3::Z));
+        assert_eq!(found.organs[0].kind, OrganKind::MainStem);
+        // Rachises are shorter than a petiole is thick times a few; what counts are petioles and the main stem.
+        let (mut matched, mut petioles) = (0, 0);
+        for (number, organ) in plant.organs.iter().enumerate() {
+            if organ.kind() == OrganKind::Leaf || organ.parent.is_some_and(|p| p > 0) {
+                continue;
+            }
+            let truth: Vec<u32> =
+                (0..).zip(&made.organ).filter(|(_, of)| **of as usize == number).map(|(i, _)| i).collect();
+            let best = found.organs.iter().map(|o| overlap(&o.source, &truth)).fold(0.0, f64::max);
+            petioles += 1;
+            matched += usize::from(best > 0.5);
+        }
+        eprintln!("seed {seed}: {matched} of {petioles} stems");
+        assert!(matched * 10 >= petioles * 8, "seed {seed}: {matched} of {petioles} stems");
+    }
+}
+
+#[test]
+fn a_stem_is_made_where_no_label_says_one() {
+    let (species, _, made) = grown("maize", 0.4, 3);
+    let mut cloud = made.cloud;
+    let lowest = |label: &i32| if *label == 0 { 1 } else { *label };
+    cloud.labels = cloud.labels.map(|labels| labels.iter().map(lowest).collect());
+    let found = divided(&cloud, &species, Labels::Own, Up::Axis(DVec3::Z));
+    assert_eq!(found.organs[0].kind, OrganKind::MainStem);
+    let low = found.organs[0].points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    assert!(low < 0.02, "the stem stands on the ground, {low}");
+}
+
+#[test]
+fn turning_and_scaling_change_nothing() {
+    let (species, _, made) = grown("soybean", 0.4, 11);
+    let whole = divided(&made.cloud, &species, Labels::None, Up::Axis(DVec3::Z));
+    let blades = |s: &Segmented| s.organs.iter().filter(|o| o.kind == OrganKind::Leaf).count();
+    let mut other = made.cloud.clone();
+    other.points.iter_mut().for_each(|p| *p = DVec3::new(-p.y, p.x, p.z) * 2.0);
+    let turned = divided(&other, &species, Labels::None, Up::Axis(DVec3::Z));
+    // Ties between equally near neighbours may fall otherwise.
+    assert!(blades(&turned).abs_diff(blades(&whole)) <= 1, "{} and {}", blades(&turned), blades(&whole));
+    let mut order: Vec<usize> = (0..made.cloud.points.len()).collect();
+    order.reverse();
+    let mut other = made.cloud.clone();
+    other.points = order.iter().map(|i| made.cloud.points[*i]).collect();
+    let reversed = divided(&other, &species, Labels::None, Up::Axis(DVec3::Z));
+    assert!(blades(&reversed).abs_diff(blades(&whole)) <= 1, "{} and {}", blades(&reversed), blades(&whole));
 }

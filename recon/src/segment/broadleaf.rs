@@ -3,10 +3,10 @@
 
 use glam::DVec3;
 
-use super::{MIN_ORGAN_POINTS, grain, nearest_to, organ, split_stems};
+use super::{MIN_ORGAN_POINTS, grain, nearest_to, organ, stems};
 use crate::axes::PrincipalAxes;
-use crate::graph::{CloudGraph, pieces, prune, skeleton};
-use crate::model::OrganKind;
+use crate::graph::{CloudGraph, Skeleton, pieces, prune};
+use crate::model::{Habit, OrganKind};
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
 
@@ -24,7 +24,7 @@ const SAME_LEAF_COSINE: f64 = 0.82;
 /// Neighbours whose votes smooth the classes.
 const VOTERS: usize = 15;
 
-pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3) -> Vec<OrganCloud> {
+pub(super) fn segment(points: &[DVec3], foot: DVec3, habit: Habit) -> Vec<OrganCloud> {
     let search = Nearest::of(points);
     let grain = grain(points, &search, 10);
     let radius = (SCALE_SHARE * crate::cloud::diagonal(points).unwrap_or(0.0)).max(2.0 * grain);
@@ -53,13 +53,12 @@ pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3) -> Vec<OrganClou
     let (leaves, crumbs): (Vec<_>, Vec<_>) = clusters.into_iter().partition(|c| c.len() >= least);
     let stems: Vec<usize> = (0..points.len()).filter(|i| is_stem[*i]).collect();
     let (leaves, stems) = adopt(points, leaves, stems, crumbs.concat());
-    let mut organs = split_stems(points, &stems, foot, up);
     let stem_points: Vec<DVec3> = stems.iter().map(|i| points[*i]).collect();
     let stem_search = Nearest::of(&stem_points);
-    for cluster in leaves {
-        let blades = split_blades(points, cluster, &stem_search, grain);
-        organs.extend(blades.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
-    }
+    let blades: Vec<Vec<usize>> =
+        leaves.into_iter().flat_map(|cluster| split_blades(points, cluster, &stem_search, grain)).collect();
+    let mut organs = stems::split(points, &stems, &blades, foot, habit);
+    organs.extend(blades.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
     organs
 }
 
@@ -90,7 +89,7 @@ fn split_blades(points: &[DVec3], members: Vec<usize>, stems: &Nearest, grain: f
     let base = (0..own.len()).fold(0, |best, i| if from_stem(i) < from_stem(best) { i } else { best });
     let graph = CloudGraph::new(&own);
     let reach = graph.distances(&[base]).into_iter().fold(0.0, f64::max);
-    let branches = skeleton(&own, &graph, base, 1.5 * grain, |_, length| length);
+    let branches = Skeleton::of(&own, &graph, base, 1.5 * grain).branches(|_, length| length);
     let blades = prune(branches, &own, LEAFLET_SHARE * reach);
     blades.into_iter().map(|b| b.members.into_iter().map(|i| members[i]).collect()).collect()
 }

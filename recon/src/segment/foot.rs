@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::thin::thinned;
+use super::lattice::one_a_cell;
 use crate::axes::PrincipalAxes;
 use crate::graph::CloudGraph;
 
@@ -27,11 +27,20 @@ pub(super) struct Foot {
 /// Finds the foot. The end of a stalk is round where a leaf's tip is a sheet; its
 /// cross-sections move along; and paths from it run straight to every other point, where paths from a tip turn back at
 /// the fork. Each is a number from 0 to 1, and an end's score is their sum, straightness twice because all of the plant
-/// has a say in it; stems count when they are known, and so does depth, twice, when the vertical is.
+/// has a say in it, and depth four times when the vertical is known. Where stems are known the foot is an end of theirs,
+/// and the lowest one of an upright plant.
 pub(super) fn find(points: &[DVec3], is_stem: Option<&[bool]>, up: Option<DVec3>) -> Foot {
-    let seen = thinned(points, SEEN);
+    let seen = one_a_cell(points, SEEN);
     let is_stem: Option<Vec<bool>> = is_stem.map(|of| seen.iter().map(|i| of[*i]).collect());
     let seen: Vec<DVec3> = seen.into_iter().map(|i| points[i]).collect();
+    let may_be = |i: usize| is_stem.as_ref().is_none_or(|of| of[i]);
+    let lowest = |up: DVec3| {
+        let candidates = (0..seen.len()).filter(|i| may_be(*i));
+        candidates.min_by(|a, b| seen[*a].dot(up).total_cmp(&seen[*b].dot(up))).unwrap_or(0)
+    };
+    if let (Some(up), true) = (up, is_stem.is_some()) {
+        return Foot { point: seen[lowest(up)], direction: up };
+    }
     let graph = CloudGraph::new(&seen);
     let heights = up.map(|up| {
         let heights: Vec<f64> = seen.iter().map(|p| p.dot(up)).collect();
@@ -42,7 +51,11 @@ pub(super) fn find(points: &[DVec3], is_stem: Option<&[bool]>, up: Option<DVec3>
     let mut best = (f64::NEG_INFINITY, Foot { point: points[0], direction: up.unwrap_or(DVec3::Z) });
     let mut nearest = graph.distances(&[0]);
     for n in 0..ENDS {
-        let end = farthest(&nearest);
+        // The lowest point is a candidate too: among many leaves a short stalk is no far end.
+        let end = match up {
+            Some(up) if n == 0 => lowest(up),
+            _ => farthest(&nearest, may_be),
+        };
         let distance = graph.distances(&[end]);
         for (near, d) in nearest.iter_mut().zip(&distance) {
             // The start of the search was no end.
@@ -50,7 +63,7 @@ pub(super) fn find(points: &[DVec3], is_stem: Option<&[bool]>, up: Option<DVec3>
         }
         let piece = Piece::of(&seen, &distance, end);
         let stem = is_stem.as_ref().map_or(0.0, |of| share(&distance, piece.reach, |i| of[i]));
-        let depth = heights.as_ref().map_or(0.0, |h| -2.0 * h[end]);
+        let depth = heights.as_ref().map_or(0.0, |h| -4.0 * h[end]);
         let score = piece.roundness + 2.0 * piece.straightness + piece.progress + stem + depth;
         if score > best.0 {
             best = (score, Foot { point: seen[end], direction: piece.direction });
@@ -59,8 +72,8 @@ pub(super) fn find(points: &[DVec3], is_stem: Option<&[bool]>, up: Option<DVec3>
     best.1
 }
 
-fn farthest(distance: &[f64]) -> usize {
-    (0..distance.len()).fold(0, |far, i| if distance[i] > distance[far] { i } else { far })
+fn farthest(distance: &[f64], may_be: impl Fn(usize) -> bool) -> usize {
+    (0..distance.len()).filter(|i| may_be(*i)).max_by(|a, b| distance[*a].total_cmp(&distance[*b])).unwrap_or(0)
 }
 
 /// The share of an end's piece that is so.

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::{MIN_ORGAN_POINTS, grain, nearest_to, organ};
-use crate::graph::{CloudGraph, prune, skeleton};
+use crate::graph::{CloudGraph, Skeleton, prune};
 use crate::model::OrganKind;
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
@@ -17,7 +17,7 @@ pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3) -> Vec<OrganClou
     let diagonal = crate::cloud::diagonal(points).unwrap_or(0.0);
     let graph = CloudGraph::new(points);
     let base = nearest_to(points, foot);
-    let branches = skeleton(points, &graph, base, 2.0 * grain, |centre, _| centre.dot(up));
+    let branches = Skeleton::of(points, &graph, base, 2.0 * grain).branches(|centre, _| centre.dot(up));
     let branches = prune(branches, points, (LEAF_SHARE * diagonal).max(4.0 * grain));
     let trunk = &branches[0];
     // The level of the trunk from which its last leaf leaves.

@@ -5,26 +5,28 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{MIN_ORGAN_POINTS, SegmentError, Segmented, Up, is_fittable, organ, split_stems};
-use crate::model::OrganKind;
+use super::{MIN_ORGAN_POINTS, Segmented, Up, grass, is_fittable, organ, stems};
+use crate::model::{Habit, OrganKind};
 
-pub(super) fn segment(points: &[DVec3], labels: &[i32], up: Up) -> Result<Segmented, SegmentError> {
+pub(super) fn segment(points: &[DVec3], labels: &[i32], habit: Habit, up: Up) -> Segmented {
     let mut members: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
     for (i, label) in labels.iter().enumerate().take(points.len()) {
         members.entry(*label.max(&0)).or_default().push(i);
     }
-    let stems = members.remove(&0).unwrap_or_default();
-    if stems.len() < MIN_ORGAN_POINTS {
-        return Err(SegmentError::Labels { found: "fewer than 12 points labelled 0 (stems)" });
-    }
+    let mut trunk = members.remove(&0).unwrap_or_default();
     let mut is_stem = vec![false; points.len()];
-    for i in &stems {
-        is_stem[*i] = true;
+    trunk.iter().for_each(|i| is_stem[*i] = true);
+    let known = trunk.len() >= MIN_ORGAN_POINTS;
+    let (up, foot) = up.resolve(points, known.then_some(is_stem.as_slice()));
+    if !known {
+        // Leaves hide the stem, or their sheaths are labelled as they are: it is what a whole plant's skeleton says.
+        trunk = grass::segment(points, foot.point, up).swap_remove(0).source.into_iter().map(|i| i as usize).collect();
+        trunk.iter().for_each(|i| is_stem[*i] = true);
+        members.values_mut().for_each(|leaf| leaf.retain(|i| !is_stem[*i]));
     }
-    let (up, foot) = up.resolve(points, Some(&is_stem));
-    let mut organs = split_stems(points, &stems, foot.point, up);
-    let leaves = members.into_values().filter(|m| m.len() >= MIN_ORGAN_POINTS);
-    organs.extend(leaves.map(|m| organ(points, OrganKind::Leaf, m)));
+    let leaves: Vec<Vec<usize>> = members.into_values().filter(|m| m.len() >= MIN_ORGAN_POINTS).collect();
+    let mut organs = stems::split(points, &trunk, &leaves, foot.point, habit);
+    organs.extend(leaves.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
     organs.retain(is_fittable);
-    Ok(Segmented { organs, up })
+    Segmented { organs, up }
 }

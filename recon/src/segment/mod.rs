@@ -5,14 +5,14 @@ mod broadleaf;
 mod foot;
 mod grass;
 mod labelled;
-mod thin;
+mod lattice;
+mod stems;
 mod up;
 
 use glam::DVec3;
 
 use crate::cloud::{PointCloud, diagonal};
 use crate::fit::{self, median_of};
-use crate::graph::CloudGraph;
 use crate::model::{Habit, OrganKind};
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
@@ -92,14 +92,14 @@ pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Resu
     }
     match (labels, &cloud.organs, &cloud.labels) {
         (Labels::Auto, Some(organs), _) => apart::segment(&cloud.points, organs, up),
-        (Labels::Auto | Labels::Own, _, Some(own)) => labelled::segment(&cloud.points, own, up),
+        (Labels::Auto | Labels::Own, _, Some(own)) => Ok(labelled::segment(&cloud.points, own, habit, up)),
         (Labels::Own, _, None) => Err(SegmentError::Labels { found: "none" }),
         (Labels::None, _, _) | (Labels::Auto, None, None) => {
             let (up, foot) = up.resolve(&cloud.points, None);
 
             let organs = match habit {
                 Habit::Grass => grass::segment(&cloud.points, foot.point, up),
-                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, foot.point, up),
+                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, foot.point, habit),
             };
             Ok(Segmented { organs: organs.into_iter().filter(is_fittable).collect(), up })
         }
@@ -133,22 +133,4 @@ fn grain(points: &[DVec3], search: &Nearest, k: usize) -> f64 {
 fn nearest_to(points: &[DVec3], place: DVec3) -> usize {
     let nearer = |i: usize, j: usize| points[i].distance_squared(place) < points[j].distance_squared(place);
     (0..points.len()).fold(0, |best, i| if nearer(i, best) { i } else { best })
-}
-
-/// Divides stem points into the main stem and its branches along their skeleton.
-fn split_stems(points: &[DVec3], members: &[usize], foot: DVec3, up: DVec3) -> Vec<OrganCloud> {
-    let own: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
-    let graph = CloudGraph::new(&own);
-    // The third neighbour, because stems of sparse scans are single rows of points.
-    let grain = grain(&own, &Nearest::of(&own), 3);
-    let base = nearest_to(&own, foot);
-    let branches = crate::graph::skeleton(&own, &graph, base, 2.0 * grain, |centre, _| centre.dot(up));
-    let kept = crate::graph::prune(branches, &own, 4.0 * grain);
-    kept.into_iter()
-        .enumerate()
-        .map(|(k, branch)| {
-            let kind = if k == 0 { OrganKind::MainStem } else { OrganKind::Stem };
-            organ(points, kind, branch.members.into_iter().map(|i| members[i]).collect())
-        })
-        .collect()
 }

@@ -9,7 +9,7 @@ const ROUNDS: usize = 4;
 
 /// Indices, ascending, of at most about `most` points: one a cell of a cubic lattice; all when there are no more.
 /// Coordinates are finite.
-pub(super) fn thinned(points: &[DVec3], most: usize) -> Vec<usize> {
+pub(super) fn one_a_cell(points: &[DVec3], most: usize) -> Vec<usize> {
     let mut chosen: Vec<usize> = (0..points.len()).collect();
     let Some(low) = points.iter().copied().reduce(DVec3::min).filter(|_| points.len() > most) else { return chosen };
     // Plants are surfaces: as many cells are filled as their area holds, so their number goes with the size's square.

@@ -1,0 +1,212 @@
+//! Stems under one label taken apart: the main stem, branches, and each leaf's petiole, along their skeleton.
+
+use glam::DVec3;
+
+use super::lattice::one_a_cell;
+use super::{grain, nearest_to, organ};
+use crate::graph::{CloudGraph, Skeleton};
+use crate::model::{Habit, OrganKind};
+use crate::nearest::Nearest;
+use crate::organs::OrganCloud;
+
+/// Points of all stems together that the skeleton is drawn from: more than a scan's stems have, few enough to be quick.
+const SEEN: usize = 6_000;
+/// Points of a blade that say where it hangs.
+const BLADE_SEEN: usize = 300;
+/// Thickness of a level of the skeleton in grains: each holds a ring of points.
+const LEVEL: f64 = 2.0;
+/// Shortest side branch in grains beyond its parent's thickness; what is shorter is a bump of it.
+const LEAST: f64 = 4.0;
+/// A side branch without leaves must be longer by this factor.
+const BARE: f64 = 3.0;
+/// Levels over which directions are compared at a fork.
+const AHEAD: usize = 6;
+/// Leaflets whose petiolules are shorter than this share of their length make one leaf (a guess: soybean's and bean's
+/// are, and the petioles of neighbouring leaves are not).
+const PETIOLULE_SHARE: f64 = 0.5;
+/// Most leaflets of a leaf (soybean and bean 3, tomato up to 9).
+const MAX_LEAFLETS: usize = 9;
+/// Cosine of the largest turn of a stem that goes on beyond its last fork (20°): petioles leave more sharply.
+const STRAIGHT: f64 = 0.94;
+/// As in the tree: what it costs a blade to hang by its middle, as a share of the way to its end.
+const MIDDLE_COST: f64 = 0.3;
+
+/// Divides the stem points `members`; `blades` say what hangs on them. The main stem comes first.
+pub(super) fn split(
+    points: &[DVec3],
+    members: &[usize],
+    blades: &[Vec<usize>],
+    foot: DVec3,
+    habit: Habit,
+) -> Vec<OrganCloud> {
+    let all: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
+    let own: Vec<DVec3> = one_a_cell(&all, SEEN).into_iter().map(|i| all[i]).collect();
+    let search = Nearest::of(&own);
+    // The third neighbour, because stems of sparse scans are single rows of points.
+    let grain = grain(&own, &search, 3);
+    let graph = CloudGraph::new(&own);
+    let skeleton = Skeleton::of(&own, &graph, nearest_to(&own, foot), LEVEL * grain);
+    let mut node_of = vec![0; own.len()];
+    for (k, set) in skeleton.sets.iter().enumerate() {
+        set.iter().for_each(|i| node_of[*i] = k);
+    }
+    let hangs: Vec<(usize, f64)> = blades
+        .iter()
+        .filter_map(|blade| {
+            let blade: Vec<DVec3> =
+                blade.iter().step_by(blade.len().div_ceil(BLADE_SEEN)).map(|i| points[*i]).collect();
+            let (at, size) = joint(&blade, &search)?;
+            Some((node_of[at], size))
+        })
+        .collect();
+    let division = Division::of(&own, skeleton, &hangs, LEAST * grain, habit);
+    let mut divided = vec![Vec::new(); division.organs];
+    for (p, i) in all.iter().zip(members) {
+        let node = search.one(*p).map_or(0, |n| node_of[n.index]);
+        divided[division.organ_of[node]].push(*i);
+    }
+    let kind = |k: usize| if k == 0 { OrganKind::MainStem } else { OrganKind::Stem };
+    divided.into_iter().enumerate().map(|(k, members)| organ(points, kind(k), members)).collect()
+}
+
+/// The stem point at which a blade hangs, and the blade's length.
+fn joint(blade: &[DVec3], stems: &Nearest) -> Option<(usize, f64)> {
+    let [a, b] = crate::tree::ends(blade);
+    let size = a.distance(b);
+    let cost = |p: &DVec3| {
+        let found = stems.one(*p)?;
+        Some((found.distance() + MIDDLE_COST * (size - p.distance(a).max(p.distance(b))), found.index))
+    };
+    let best = blade.iter().filter_map(cost).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, at)| (at, size))
+}
+
+/// A skeleton's nodes given to organs.
+struct Division {
+    skeleton: Skeleton,
+    children: Vec<Vec<usize>>,
+    /// Leaves at and beyond each node.
+    leaves: Vec<usize>,
+    /// Length of the longest path beyond each node, metres.
+    beyond: Vec<f64>,
+    /// Mean distance of each node's points from its centre, metres.
+    radius: Vec<f64>,
+    /// Length of a side branch beyond its parent's thickness, metres.
+    least: f64,
+    organ_of: Vec<usize>,
+    organs: usize,
+}
+
+impl Division {
+    fn of(points: &[DVec3], skeleton: Skeleton, hangs: &[(usize, f64)], least: f64, habit: Habit) -> Self {
+        let n = skeleton.sets.len();
+        let mut children = vec![Vec::new(); n];
+        for (k, parent) in skeleton.parent.iter().enumerate() {
+            parent.iter().for_each(|p| children[*p].push(k));
+        }
+        let radius = (0..n)
+            .map(|k| {
+                let set = &skeleton.sets[k];
+                set.iter().map(|i| points[*i].distance(skeleton.centres[k])).sum::<f64>() / set.len() as f64
+            })
+            .collect();
+        let mut division = Self {
+            children,
+            leaves: vec![0; n],
+            beyond: vec![0.0; n],
+            radius,
+            least,
+            organ_of: vec![0; n],
+            organs: 1,
+            skeleton,
+        };
+        division.count_leaves(hangs, habit);
+        division.walk();
+        division
+    }
+
+    /// Counts leaves from the tips down; blades whose ways part only shortly before them are leaflets of one leaf.
+    fn count_leaves(&mut self, hangs: &[(usize, f64)], habit: Habit) {
+        let n = self.leaves.len();
+        let mut blades: Vec<usize> = vec![0; n];
+        let mut length = vec![0.0_f64; n];
+        // Length of the longest way from each node to a blade.
+        let mut way = vec![0.0_f64; n];
+        for (node, size) in hangs {
+            blades[*node] += 1;
+            self.leaves[*node] += 1;
+            length[*node] = length[*node].max(*size);
+        }
+        for k in (0..n).rev() {
+            let leaflets = habit == Habit::Compound && (2..=MAX_LEAFLETS).contains(&blades[k]);
+            if leaflets && way[k] < PETIOLULE_SHARE * length[k] {
+                self.leaves[k] = 1;
+            }
+            let Some(p) = self.skeleton.parent[k] else { continue };
+            let step = self.skeleton.centres[k].distance(self.skeleton.centres[p]);
+            self.beyond[p] = self.beyond[p].max(self.beyond[k] + step);
+            blades[p] += blades[k];
+            self.leaves[p] += self.leaves[k];
+            if blades[k] > 0 {
+                way[p] = way[p].max(way[k] + step);
+                length[p] = length[p].max(length[k]);
+            }
+        }
+    }
+
+    /// Gives nodes to organs, from the base on: at a fork the organ goes on along one child, and every other child
+    /// long enough starts an organ of its own.
+    fn walk(&mut self) {
+        for k in 0..self.children.len() {
+            let organ = self.organ_of[k];
+            let branches: Vec<usize> = self.children[k].iter().copied().filter(|c| self.is_branch(k, *c)).collect();
+            let onward = self.onward(k, organ, &branches);
+            for c in self.children[k].clone() {
+                self.organ_of[c] = if Some(c) == onward || !branches.contains(&c) {
+                    organ
+                } else {
+                    self.organs += 1;
+                    self.organs - 1
+                };
+            }
+        }
+    }
+
+    fn is_branch(&self, k: usize, child: usize) -> bool {
+        let before = self.back(k, 2);
+        let thick = self.radius[k].min(self.radius[before]);
+        let step = self.skeleton.centres[k].distance(self.skeleton.centres[child]);
+        let least = if self.leaves[child] > 0 { 1.0 } else { BARE } * (self.least + thick);
+        self.beyond[child] + step > least
+    }
+
+    /// The child along which an organ goes on: the one with most leaves, of equal ones the straightest. A main stem or
+    /// branch ends at its last fork unless one child goes straight on.
+    fn onward(&self, k: usize, organ: usize, branches: &[usize]) -> Option<usize> {
+        let turn = |c: usize| self.straightness(k, c);
+        let better = |a: &usize, b: &usize| {
+            let most = self.leaves[*a].max(1).cmp(&self.leaves[*b].max(1));
+            most.then(turn(*a).total_cmp(&turn(*b)))
+        };
+        let best = branches.iter().copied().max_by(better)?;
+        let carries_several = self.leaves[best] > 1 || (organ != 0 && self.leaves[k] <= 1);
+        (branches.len() == 1 || carries_several || turn(best) > STRAIGHT).then_some(best)
+    }
+
+    /// The node `steps` below.
+    fn back(&self, k: usize, steps: usize) -> usize {
+        (0..steps).fold(k, |k, _| self.skeleton.parent[k].unwrap_or(k))
+    }
+
+    /// Cosine between the way to a node and the way on through a child.
+    fn straightness(&self, k: usize, child: usize) -> f64 {
+        let longest = |k: usize| {
+            let longer = |a: &&usize, b: &&usize| self.beyond[**a].total_cmp(&self.beyond[**b]);
+            self.children[k].iter().max_by(longer).copied().unwrap_or(k)
+        };
+        let at = self.skeleton.centres[k];
+        let arriving = (at - self.skeleton.centres[self.back(k, AHEAD)]).normalize_or_zero();
+        let ahead = (1..AHEAD).fold(child, |k, _| longest(k));
+        arriving.dot((self.skeleton.centres[ahead] - at).normalize_or_zero())
+    }
+}
