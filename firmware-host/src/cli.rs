@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::{decode, doctor, eval, fit, learn, photo, plants, replay, run, synth};
+use crate::commands::{decode, doctor, edit, eval, fit, import, learn, photo, plants, replay, run, species, synth};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -31,6 +31,12 @@ enum Command {
     Fit(fit::Args),
     /// Learn a species from scans.
     Learn(learn::Args),
+    /// Change a plant: move coefficients, bend stems, cut, graft, go towards another plant.
+    Edit(edit::Args),
+    /// Read a plant of the authors' Demeter release.
+    Import(import::Args),
+    /// List, show, export and import species.
+    Species(species::Args),
     /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
     Doctor(doctor::Args),
     /// Reconstruct the plants of a photo.
@@ -52,6 +58,9 @@ impl Command {
             Self::Eval(args) => eval::run(args, output),
             Self::Fit(args) => fit::run(args, output),
             Self::Learn(args) => learn::run(args, output),
+            Self::Edit(args) => edit::run(args, output),
+            Self::Import(args) => import::run(args, output),
+            Self::Species(args) => species::run(args, output),
             Self::Doctor(args) => doctor::run(args, output),
             Self::Photo(args) => photo::run(args, output),
             Self::Replay(args) => replay::run(args, output),

@@ -5,6 +5,8 @@ use std::io::{Read, Write};
 use std::path::Path;
 
 use demeter_recon::model::{Plant, Species};
+use demeter_recon::organs::ScaleSource;
+use demeter_recon::record::{self, Record, RecordError};
 
 use crate::error::{CommandError, Exit};
 use crate::mesh_file::MeshFormat;
@@ -80,6 +82,49 @@ pub fn species(name: &str) -> Result<Species, CommandError> {
             Err(CommandError::usage("species", message).with(known, name))
         }
     }
+}
+
+/// The record in a file's `bytes` with its species: the one of `--species` where that is given, else the shipped one
+/// that the record names.
+///
+/// # Errors
+/// [`CommandError`] naming the record, and the species file that it needs when another one is at hand.
+pub fn record(path: &Path, bytes: &[u8], species: Option<&str>) -> Result<(Record, Species), CommandError> {
+    let refused = |error: RecordError| {
+        let mut refused = CommandError::failed("record", &error);
+        refused.message = format!("{}: {}", path.display(), refused.message);
+        if let RecordError::Species { expected, found } = &error {
+            refused.message += "; give the species file that it was written with by --species";
+            return refused.with(expected, found);
+        }
+        refused
+    };
+    let wanted = record::peek(bytes).map_err(refused)?;
+    let shipped = demeter_recon::species::shipped(&wanted.name).is_some();
+    let species = match species {
+        Some(species) => self::species(species)?,
+        None if shipped => self::species(&wanted.name)?,
+        None => {
+            let found =
+                format!("none of that name among those that ship ({})", demeter_recon::species::NAMES.join(", "));
+            return Err(refused(RecordError::Species { expected: wanted.to_string(), found }));
+        }
+    };
+    Ok((record::decode(bytes, |_| Some(&species)).map_err(refused)?, species))
+}
+
+/// What goes into a plant's record file, compact unless `exact`.
+///
+/// # Errors
+/// [`CommandError`] `record` when the plant has no record.
+pub fn encode(
+    plant: &Plant,
+    species: &Species,
+    scale_source: ScaleSource,
+    exact: bool,
+) -> Result<Vec<u8>, CommandError> {
+    let encode = if exact { record::encode_exact } else { record::encode_compact };
+    encode(plant, species, scale_source).map_err(|error| CommandError::failed("record", &error))
 }
 
 pub(crate) fn file_error(path: &Path, error: &std::io::Error) -> CommandError {

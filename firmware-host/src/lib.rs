@@ -19,5 +19,6 @@ pub mod pipeline;
 pub mod reconstruct;
 pub mod report;
 pub mod store;
+pub mod studio;
 pub mod synthetic;
 pub mod worker;

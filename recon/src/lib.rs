@@ -8,6 +8,7 @@
 mod axes;
 pub mod baseline;
 pub mod cloud;
+pub mod edit;
 pub mod export;
 pub mod fit;
 pub mod graph;

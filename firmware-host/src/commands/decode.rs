@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use demeter_recon::record::{decode, peek};
-
 use crate::describe::report;
 use crate::error::{CommandError, Exit};
 use crate::files;
@@ -15,6 +13,9 @@ use crate::report::Document;
 pub struct Args {
     /// The record: compact or exact.
     record: PathBuf,
+    /// The species file that the record was written with, where it is not one of those that ship.
+    #[arg(long)]
+    species: Option<String>,
     /// Also write the plant's surface: .ply, .obj or .glb.
     #[arg(long)]
     mesh: Option<PathBuf>,
@@ -25,14 +26,8 @@ pub struct Args {
 /// # Errors
 /// [`CommandError`] naming the file and what is wrong with it.
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    let refused = |error: &dyn std::error::Error| {
-        let mut refused = CommandError::failed("record", error);
-        refused.message = format!("{}: {}", args.record.display(), refused.message);
-        refused
-    };
     let bytes = files::read(&args.record)?;
-    let species = files::species(&peek(&bytes).map_err(|error| refused(&error))?.name)?;
-    let record = decode(&bytes, |_| Some(&species)).map_err(|error| refused(&error))?;
+    let (record, species) = files::record(&args.record, &bytes, args.species.as_deref())?;
     let mut report = report(&record.plant, &species, bytes.len(), record.scale_source)?;
     report.record = Some(args.record.display().to_string());
     if let Some(path) = &args.mesh {

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::config::Config;
 use crate::error::{CommandError, Exit, chain};
+use crate::files;
 use crate::output::Output;
 use crate::store::{Reader, StoreError};
 
@@ -132,10 +133,8 @@ fn check_organ2d(runtime: &Runtime) -> Result<String, Trouble> {
 
 fn check_species() -> Result<String, Trouble> {
     for name in demeter_recon::species::NAMES {
-        let species = demeter_recon::species::shipped(name);
-        if let Some(Err(error)) = species {
-            return Err(Trouble::new(&error, "install the program again: its species are part of it"));
-        }
+        files::species(name)
+            .map_err(|error| Trouble::new(&error, "install the program again: its species are part of it"))?;
     }
     Ok(demeter_recon::species::NAMES.join(", "))
 }

@@ -2,11 +2,14 @@
 
 pub mod decode;
 pub mod doctor;
+pub mod edit;
 pub mod eval;
 pub mod fit;
+pub mod import;
 pub mod learn;
 pub mod photo;
 pub mod plants;
 pub mod replay;
 pub mod run;
+pub mod species;
 pub mod synth;

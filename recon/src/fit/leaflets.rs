@@ -8,7 +8,7 @@ use crate::model::{Form, Habit, Organ, OrganKind};
 const MAX_LEAFLETS: usize = 9;
 
 /// Numbers the leaves: leaflets on one petiole make one leaf.
-pub(super) fn group(organs: &mut [Organ], habit: Habit) {
+pub(crate) fn group(organs: &mut [Organ], habit: Habit) {
     // The stem next to the main stem that carries each organ: its petiole, or its branch.
     let mut petiole: Vec<Option<usize>> = Vec::with_capacity(organs.len());
     for (i, organ) in organs.iter().enumerate() {

@@ -9,7 +9,7 @@ mod centreline;
 mod error;
 mod hanger;
 mod leaf;
-mod leaflets;
+pub(crate) mod leaflets;
 mod lone;
 mod orient;
 pub(crate) mod solver;

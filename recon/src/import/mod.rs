@@ -1,6 +1,7 @@
 //! Files of others, read from bytes.
 
 mod ply;
+pub mod release;
 mod text;
 
 pub use ply::{MAX_POINTS, PlyError};

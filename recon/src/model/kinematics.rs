@@ -1,8 +1,9 @@
 //! Forward kinematics: one pass from the root to the tips (paper eq. 3).
 
+use demeter_frame::Pose;
 use glam::{DQuat, DVec3};
 
-use super::plant::{Form, Plant, PlantError};
+use super::plant::{Form, Joint, Plant, PlantError};
 use super::species::Species;
 use super::stem::{BONES, StemCurve};
 
@@ -22,6 +23,13 @@ impl Similarity {
     #[must_use]
     pub fn point(&self, x_in_organ: DVec3) -> DVec3 {
         self.translation + self.rotation * (x_in_organ * self.scale)
+    }
+
+    /// The frame in which this stem's children at d hang, the stem's curve being `curve`.
+    #[must_use]
+    pub fn at(&self, curve: &StemCurve, d: f64) -> Self {
+        let (p, frame) = attachment(curve, d);
+        Self { rotation: self.rotation * frame, translation: self.point(p), scale: self.scale }
     }
 }
 
@@ -49,58 +57,76 @@ pub struct PosedPlant {
     pub side: Vec<DVec3>,
 }
 
+/// An organ's own geometry, in its own frame and unit size, whatever it was made from.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// A stem's curve and its radius in units of the stem.
+    Stem(StemCurve, f64),
+    /// A blade's control points.
+    Blade(Vec<DVec3>),
+}
+
+impl Form {
+    /// The form's geometry in a species.
+    #[must_use]
+    pub fn shape(&self, species: &Species) -> Shape {
+        match self {
+            Self::Stem { gamma, radius } => Shape::Stem(species.stem.curve(gamma), *radius),
+            Self::Leaf { blade, .. } => Shape::Blade(species.leaf.grid(blade).points),
+        }
+    }
+}
+
 /// Poses a plant.
 ///
 /// # Errors
 /// [`PlantError`] when the plant is none (see [`Plant::validate`]).
 pub fn forward(plant: &Plant, species: &Species) -> Result<PosedPlant, PlantError> {
     plant.validate()?;
-    let count = plant.organs.len();
-    let mut curves: Vec<Option<StemCurve>> = Vec::with_capacity(count);
-    let mut posed = PosedPlant {
-        world_from_organ: Vec::with_capacity(count),
-        control: Vec::with_capacity(count),
-        radius: Vec::with_capacity(count),
-        side: Vec::with_capacity(count),
-    };
-    for organ in &plant.organs {
-        let base = match organ.parent {
+    articulate(
+        plant.world_from_plant,
+        plant.organs.iter().map(|organ| (organ.parent, organ.joint, organ.form.shape(species))),
+    )
+}
+
+/// Hangs organs on each other, parents before children: `(parent, joint, shape)` of each.
+///
+/// # Errors
+/// [`PlantError`] when an organ hangs on a leaf or on one that does not stand before it.
+pub fn articulate(
+    world_from_plant: Pose,
+    organs: impl Iterator<Item = (Option<usize>, Joint, Shape)>,
+) -> Result<PosedPlant, PlantError> {
+    let mut shapes: Vec<Shape> = Vec::new();
+    let mut posed =
+        PosedPlant { world_from_organ: Vec::new(), control: Vec::new(), radius: Vec::new(), side: Vec::new() };
+    for (organ, (parent, joint, shape)) in organs.enumerate() {
+        let base = match parent {
             None => Similarity {
-                rotation: plant.world_from_plant.rotation,
-                translation: plant.world_from_plant.translation,
+                rotation: world_from_plant.rotation,
+                translation: world_from_plant.translation,
                 scale: 1.0,
             },
-            Some(parent) => {
-                let world_from_parent: Similarity = posed.world_from_organ[parent];
-                let (p, frame) = match &curves[parent] {
-                    Some(curve) => attachment(curve, organ.joint.d),
-                    None => return Err(PlantError::LeafParent { organ: posed.control.len(), parent }),
-                };
-                Similarity {
-                    rotation: world_from_parent.rotation * frame,
-                    translation: world_from_parent.point(p),
-                    scale: world_from_parent.scale,
-                }
-            }
+            Some(parent) => match shapes.get(parent) {
+                Some(Shape::Stem(curve, _)) => posed.world_from_organ[parent].at(curve, joint.d),
+                Some(Shape::Blade(_)) => return Err(PlantError::LeafParent { organ, parent }),
+                None => return Err(PlantError::Parent { organ, found: parent }),
+            },
         };
         let world_from_organ = Similarity {
-            rotation: (base.rotation * organ.joint.rotation).normalize(),
+            rotation: (base.rotation * joint.rotation).normalize(),
             translation: base.translation,
-            scale: base.scale * organ.joint.scale,
+            scale: base.scale * joint.scale,
         };
-        let (points, curve, radius) = match &organ.form {
-            Form::Stem { gamma, radius } => {
-                let curve = species.stem.curve(gamma);
-                (curve.points.clone(), Some(curve), radius * world_from_organ.scale)
-            }
-            Form::Leaf { blade, .. } => (species.leaf.grid(blade).points, None, 0.0),
+        let (points, radius, unbent) = match &shape {
+            Shape::Stem(curve, radius) => (&curve.points, radius * world_from_organ.scale, curve.frames[0]),
+            Shape::Blade(points) => (points, 0.0, DQuat::IDENTITY),
         };
-        posed.control.push(points.into_iter().map(|p| world_from_organ.point(p)).collect());
+        posed.control.push(points.iter().map(|p| world_from_organ.point(*p)).collect());
         posed.radius.push(radius);
-        let unbent = curve.as_ref().map_or(DQuat::IDENTITY, |curve| curve.frames[0]);
         posed.side.push(world_from_organ.rotation * (unbent * DVec3::X));
         posed.world_from_organ.push(world_from_organ);
-        curves.push(curve);
+        shapes.push(shape);
     }
     Ok(posed)
 }

@@ -1,6 +1,7 @@
 //! The leaf: a flat grid shaped by β, bent by joint angles γ (paper 3.1, eq. 4 and 5).
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
+use nalgebra::DVector;
 
 use super::basis::Basis;
 use super::chain::{Change, Joint};
@@ -169,6 +170,24 @@ impl BladeJacobian {
     }
 }
 
+impl BladeGrid {
+    /// A flat grid `[45*43]` bent by joint angles `[3700]`.
+    #[must_use]
+    pub fn bent(flat: &[DVec2], angles: &DVector<f64>) -> Self {
+        let mut points = vec![DVec3::ZERO; POINTS];
+        walk(
+            Lattice::WHOLE,
+            &Joint::at_origin(0, 0),
+            |n| flat[n].extend(0.0),
+            |joint, axes, q, _, bone| joint.advance(axes, [angles[q], angles[q + 1]], bone, Change::default()),
+            |n, joint| points[n] = joint.point,
+        );
+        let gauge = gauge(&points);
+        points.iter_mut().for_each(|p| *p = gauge * *p);
+        Self { points, gauge }
+    }
+}
+
 impl LeafModel {
     /// The flat leaf of β and s_x: (x, y) of each node.
     #[must_use]
@@ -219,21 +238,15 @@ impl LeafModel {
         BladeJacobian { points, derivatives, coefficients }
     }
 
-    /// Bends the flat grid, the main vein as one chain, each inner row as two chains that leave it (paper eq. 5), and
-    /// shows each node of the lattice to `put`. Joints carry derivatives by γ and by β, ln s_x, or (0, 0) for none.
-    fn bend(
-        &self,
-        blade: &Blade,
-        lattice: Lattice,
-        (swings, slides): (usize, usize),
-        mut put: impl FnMut(usize, &Joint),
-    ) {
+    /// Bends the flat grid and shows each node of the lattice to `put`. Joints carry derivatives by γ and by β, ln s_x,
+    /// or (0, 0) for none.
+    fn bend(&self, blade: &Blade, lattice: Lattice, (swings, slides): (usize, usize), put: impl FnMut(usize, &Joint)) {
         let flat = |n: usize| {
             let of = |m: usize| self.shape.one(m, &blade.beta);
             DVec3::new(of(2 * n) * blade.width, of(2 * n + 1), 0.0)
         };
         let mut dbone = [vec![0.0; slides], vec![0.0; slides]];
-        let mut advance = |joint: &mut Joint, axes: [DVec3; 2], q: usize, (to, from): (usize, usize), bone: DVec3| {
+        let advance = |joint: &mut Joint, axes: [DVec3; 2], q: usize, (to, from): (usize, usize), bone: DVec3| {
             let angles = [self.deform.one(q, &blade.gamma), self.deform.one(q + 1, &blade.gamma)];
             if slides == 0 {
                 joint.advance(axes, angles, bone, Change::default());
@@ -252,39 +265,52 @@ impl LeafModel {
             };
             joint.advance(axes, angles, bone, change);
         };
-        let mut vein = Joint::at_origin(swings, slides);
-        for j in 0..lattice.columns() {
-            put(lattice.node(0, j), &vein);
+        walk(lattice, &Joint::at_origin(swings, slides), flat, advance, put);
+    }
+}
+
+/// Walks a blade's bones, the main vein as one chain, each inner row as two chains that leave it (paper eq. 5), and
+/// shows each node of the lattice to `put`. `flat` gives nodes of the flat grid; `advance` takes a joint along a bone:
+/// its two axes, its first angle's index, the nodes `(to, from)` and the bone itself.
+fn walk(
+    lattice: Lattice,
+    start: &Joint,
+    flat: impl Fn(usize) -> DVec3,
+    mut advance: impl FnMut(&mut Joint, [DVec3; 2], usize, (usize, usize), DVec3),
+    mut put: impl FnMut(usize, &Joint),
+) {
+    let mut vein = start.clone();
+    for j in 0..lattice.columns() {
+        put(lattice.node(0, j), &vein);
+    }
+    let mut last = flat(node(0, VEIN));
+    for i in 1..ROWS {
+        let (to, from) = (node(i, VEIN), node(i - 1, VEIN));
+        let here = flat(to);
+        advance(&mut vein, [DVec3::X, DVec3::Z], vein_angle(i), (to, from), here - last);
+        last = here;
+        if !i.is_multiple_of(lattice.along) {
+            continue;
         }
-        let mut last = flat(node(0, VEIN));
-        for i in 1..ROWS {
-            let (to, from) = (node(i, VEIN), node(i - 1, VEIN));
-            let here = flat(to);
-            advance(&mut vein, [DVec3::X, DVec3::Z], vein_angle(i), (to, from), here - last);
-            last = here;
-            if !i.is_multiple_of(lattice.along) {
-                continue;
+        let row = i / lattice.along;
+        if i == ROWS - 1 {
+            // The tip row is one point.
+            for j in 0..lattice.columns() {
+                put(lattice.node(row, j), &vein);
             }
-            let row = i / lattice.along;
-            if i == ROWS - 1 {
-                // The tip row is one point.
-                for j in 0..lattice.columns() {
-                    put(lattice.node(row, j), &vein);
-                }
-                break;
-            }
-            put(lattice.node(row, lattice.columns() / 2), &vein);
-            for side in Side::BOTH {
-                let mut rib = vein.clone();
-                let mut inner = here;
-                for k in 1..=VEIN {
-                    let (to, from) = (node(i, side.column(k)), node(i, side.column(k - 1)));
-                    let outer = flat(to);
-                    advance(&mut rib, [DVec3::Y, DVec3::Z], side_angle(i, side, k), (to, from), outer - inner);
-                    inner = outer;
-                    if k.is_multiple_of(lattice.across) {
-                        put(lattice.node(row, side.column(k) / lattice.across), &rib);
-                    }
+            break;
+        }
+        put(lattice.node(row, lattice.columns() / 2), &vein);
+        for side in Side::BOTH {
+            let mut rib = vein.clone();
+            let mut inner = here;
+            for k in 1..=VEIN {
+                let (to, from) = (node(i, side.column(k)), node(i, side.column(k - 1)));
+                let outer = flat(to);
+                advance(&mut rib, [DVec3::Y, DVec3::Z], side_angle(i, side, k), (to, from), outer - inner);
+                inner = outer;
+                if k.is_multiple_of(lattice.across) {
+                    put(lattice.node(row, side.column(k) / lattice.across), &rib);
                 }
             }
         }

@@ -7,6 +7,7 @@
 mod basis;
 mod catmull_rom;
 mod chain;
+mod inverse;
 pub mod kinematics;
 pub mod leaf;
 pub mod mesh;
@@ -17,7 +18,8 @@ pub mod stem;
 
 pub use basis::{Basis, BasisError};
 pub use catmull_rom::{Knots, refine};
-pub use kinematics::{PosedPlant, Similarity, forward};
+pub use inverse::{leaf_angles, stem_angles};
+pub use kinematics::{PosedPlant, Shape, Similarity, articulate, forward};
 pub use mesh::{Detail, PlantMesh};
 pub use plant::{Form, Joint, Organ, OrganKind, Plant, PlantError};
 pub use priors::{JointPrior, Normal, Priors};

@@ -1,6 +1,7 @@
 //! The stem: 24 control points, 23 unit-path bones bent by joint angles (spec/demeter-model.md "Deformation").
 
 use glam::{DQuat, DVec3};
+use nalgebra::DVector;
 
 use super::basis::Basis;
 use super::chain::{Change, Joint};
@@ -10,6 +11,8 @@ use super::leaf::frame_of;
 pub const POINTS: usize = 24;
 /// Bones of a stem; each is 1/23 long, so the path length is 1.
 pub const BONES: usize = POINTS - 1;
+/// Lengths of the bones in stems' unit of path length.
+const BONE_LENGTHS: [f64; BONES] = [1.0 / BONES as f64; BONES];
 /// Joint angles: (a, b) of each bone, interleaved.
 pub const ANGLES: usize = 2 * BONES;
 
@@ -44,39 +47,55 @@ impl StemModel {
     /// The gauged curve of γ.
     #[must_use]
     pub fn curve(&self, gamma: &[f64]) -> StemCurve {
-        let (raw, frames, _) = self.chain(gamma, 0);
-        let gauge = gauge(&raw);
-        StemCurve {
-            points: raw.iter().map(|p| gauge * *p).collect(),
-            frames: frames.iter().map(|f| (gauge * *f).normalize()).collect(),
-        }
+        StemCurve::bent(&BONE_LENGTHS, &self.deform.at(gamma))
     }
 
     /// The raw (ungauged) control points and their analytic derivatives by γ.
     #[must_use]
     pub fn jacobian(&self, gamma: &[f64]) -> StemJacobian {
         let coefficients = self.deform.rank();
-        let (points, _, derivatives) = self.chain(gamma, coefficients);
+        let angles = self.deform.at(gamma);
+        let (points, _, derivatives) = chain(&BONE_LENGTHS, &angles, coefficients, |q| Change {
+            angles: [self.deform.derivative(q), self.deform.derivative(q + 1)],
+            ..Change::default()
+        });
         StemJacobian { points, derivatives, coefficients }
     }
+}
 
-    fn chain(&self, gamma: &[f64], coefficients: usize) -> (Vec<DVec3>, Vec<DQuat>, Vec<DVec3>) {
-        let angles = self.deform.at(gamma);
-        let bone = DVec3::Y / BONES as f64;
-        let mut joint = Joint::at_origin(coefficients, 0);
-        let (mut points, mut frames) = (vec![joint.point], vec![DQuat::IDENTITY]);
-        let mut derivatives = vec![DVec3::ZERO; coefficients];
-        for q in (0..ANGLES).step_by(2) {
-            let change =
-                Change { angles: [self.deform.derivative(q), self.deform.derivative(q + 1)], ..Change::default() };
-            joint.advance([DVec3::X, DVec3::Z], [angles[q], angles[q + 1]], bone, change);
-            points.push(joint.point);
-            frames.push(DQuat::from_mat3(&joint.frame).normalize());
-            let [x, y, z] = [0, 1, 2].map(|axis| joint.velocity(axis).0);
-            derivatives.extend((0..coefficients).map(|k| DVec3::new(x[k], y[k], z[k])));
+impl StemCurve {
+    /// A straight stem of bones with these lengths `[23]`, along +y, bent by joint angles `[46]`.
+    #[must_use]
+    pub fn bent(lengths: &[f64], angles: &DVector<f64>) -> Self {
+        let (raw, frames, _) = chain(lengths, angles, 0, |_| Change::default());
+        let gauge = gauge(&raw);
+        Self {
+            points: raw.iter().map(|p| gauge * *p).collect(),
+            frames: frames.iter().map(|f| (gauge * *f).normalize()).collect(),
         }
-        (points, frames, derivatives)
     }
+}
+
+/// Control points, frames and derivatives by `coefficients` angle coefficients; `change` gives those of the bone whose
+/// first angle has that index.
+fn chain<'a>(
+    lengths: &[f64],
+    angles: &DVector<f64>,
+    coefficients: usize,
+    change: impl Fn(usize) -> Change<'a>,
+) -> (Vec<DVec3>, Vec<DQuat>, Vec<DVec3>) {
+    let mut joint = Joint::at_origin(coefficients, 0);
+    let (mut points, mut frames) = (vec![joint.point], vec![DQuat::IDENTITY]);
+    let mut derivatives = vec![DVec3::ZERO; coefficients];
+    for (bone, length) in lengths.iter().enumerate() {
+        let q = 2 * bone;
+        joint.advance([DVec3::X, DVec3::Z], [angles[q], angles[q + 1]], DVec3::Y * *length, change(q));
+        points.push(joint.point);
+        frames.push(DQuat::from_mat3(&joint.frame).normalize());
+        let [x, y, z] = [0, 1, 2].map(|axis| joint.velocity(axis).0);
+        derivatives.extend((0..coefficients).map(|k| DVec3::new(x[k], y[k], z[k])));
+    }
+    (points, frames, derivatives)
 }
 
 /// The rotation that brings a bent stem (base at the origin) to its gauge: end on +y, centroid of the control points

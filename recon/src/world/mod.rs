@@ -28,6 +28,7 @@ pub use render::{OrganRef, View, render};
 pub use row::{Lab, Row, lab, row};
 pub use scene::{Backdrop, Ground, Light, Pot, Scene, Setting, Standing, WorldError};
 pub use sensor::Sensor;
+pub(crate) use sprout::normal;
 pub use surface::Surface;
 pub use training::training_view;
 pub use truth::{OrganTruth, PlantTruth, truth};

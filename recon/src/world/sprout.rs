@@ -82,7 +82,7 @@ fn frame(azimuth: f64, tilt: f64, side: f64) -> DQuat {
 }
 
 /// A standard normal number, cut at 2.5 (Box-Muller; what lies outside is drawn again).
-pub(super) fn normal(rng: &mut Seeded) -> f64 {
+pub(crate) fn normal(rng: &mut Seeded) -> f64 {
     loop {
         let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
         let x = radius * (std::f64::consts::TAU * rng.random::<f64>()).cos();

@@ -1,19 +1,16 @@
 use std::path::PathBuf;
 
-use demeter_frame::{Intrinsics, Pinhole, Pose};
-use demeter_recon::model::Detail;
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::record::encode_exact;
-use demeter_recon::world::{Scene, Sensor, Setting, grow, render, seeded};
-use glam::DVec3;
+use demeter_recon::world::{grow, seeded};
 
 use super::unit_interval;
 use crate::describe::report;
 use crate::error::{CommandError, Exit};
 use crate::files;
 use crate::output::Output;
-use crate::picture::png;
 use crate::report::Document;
+use crate::studio;
 
 /// Arguments of `demeter synth plant`.
 #[derive(Debug, clap::Args)]
@@ -53,19 +50,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let mut report = report(&plant, &species, record.len(), ScaleSource::Input)?;
     report.record = Some(args.output.display().to_string());
     if let Some(path) = &args.picture {
-        let scene = Scene::new(vec![(&species, plant)], Setting::STUDIO, Detail::Control, args.seed)
-            .map_err(|error| failed(&error))?;
-        let (low, high) = scene.bounds();
-        let (middle, reach) = (f64::from((low + high).z) * 0.5, f64::from((high - low).max_element()));
-        // 40 degrees show 0.73 of the distance; a margin is left.
-        let eye = DVec3::new(0.0, -1.6 * reach, middle + 0.25 * reach);
-        let camera = Pinhole {
-            intrinsics: Intrinsics::from_hfov(PICTURE_SIDE, PICTURE_SIDE, 40f64.to_radians()),
-            world_from_camera: Pose::looking_at(eye, DVec3::Z * middle, DVec3::Z),
-        };
-        let sensor = Sensor { samples: 2, exposure: 0.5, ..Sensor::CLEAN };
-        let view = render(&scene, &camera, &sensor, &mut seeded(args.seed));
-        files::write(path, &png(&view.rgb).map_err(|error| failed(&error))?)?;
+        files::write(path, &studio::picture(vec![(&species, plant)], [PICTURE_SIDE; 2], args.seed)?)?;
     }
     output.plants(&Document { plants: vec![report], ..Document::default() })?;
     Ok(Exit::Done)

@@ -1,0 +1,96 @@
+//! `demeter import`: a plant of the authors' release becomes a record.
+
+use std::path::{Path, PathBuf};
+
+use demeter_recon::import::release::{Bases, FILES, PLANT_FILES, RawPlant, ReleaseError, ReleasePlant};
+use demeter_recon::model::{PosedPlant, forward};
+use demeter_recon::organs::ScaleSource;
+use glam::DVec3;
+
+use crate::describe::report;
+use crate::error::{CommandError, Exit};
+use crate::files;
+use crate::output::Output;
+use crate::report::Document;
+
+/// Arguments of `demeter import`. The release's licence is academic and non-commercial: so is what comes of it.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The plant's folder, with graph.pkl and info/.
+    plant: PathBuf,
+    /// The release's folder of bases; the one around the plant's unless given.
+    #[arg(long)]
+    release: Option<PathBuf>,
+    /// Species to hold the plant in: best one from `demeter species import`.
+    #[arg(long)]
+    species: String,
+    /// Where the record goes.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Write the exact encoding instead of the compact one.
+    #[arg(long)]
+    exact: bool,
+    /// Also write the plant's surface: .ply, .obj or .glb.
+    #[arg(long)]
+    mesh: Option<PathBuf>,
+}
+
+/// Reads the plant, projects it on the species and writes the record; a warning says how far that moved its points.
+///
+/// # Errors
+/// [`CommandError`] naming the file and what is wrong with it.
+pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
+    let failed = |error: &dyn std::error::Error| CommandError::failed("release", error);
+    let species = files::species(&args.species)?;
+    let around = args.plant.join("..");
+    let bases = bases(args.release.as_ref().unwrap_or(&around))?;
+    let parts = read(&args.plant, PLANT_FILES)?;
+    let plant = ReleasePlant::read([&parts[0], &parts[1], &parts[2]]).map_err(|error| refused(&args.plant, &error))?;
+    let raw = RawPlant::of(&plant, &bases);
+    let projected = raw.project(&species);
+    let record = files::encode(&projected, &species, ScaleSource::Input, args.exact)?;
+    files::write(&args.output, &record)?;
+    if let Some(path) = &args.mesh {
+        files::write_mesh(path, &projected, &species)?;
+    }
+    let before = raw.pose().map_err(|error| failed(&error))?;
+    let after = forward(&projected, &species).map_err(|error| failed(&error))?;
+    let mut report = report(&projected, &species, record.len(), ScaleSource::Input)?;
+    report.record = Some(args.output.display().to_string());
+    report.warnings.push(format!(
+        "control points moved by {:.2} % of the plant's diagonal on average, for its angles do not all lie in the species' basis",
+        100.0 * moved(&before, &after)
+    ));
+    if !plant.left_out.is_empty() {
+        report.warnings.push(format!("nodes of other classes than leaf and stem were left out: {:?}", plant.left_out));
+    }
+    output.plants(&Document { plants: vec![report], ..Document::default() })?;
+    Ok(Exit::Done)
+}
+
+/// Mean distance of control points in diagonals of the first plant's.
+fn moved(before: &PosedPlant, after: &PosedPlant) -> f64 {
+    let points = || before.control.iter().flatten();
+    let (low, high) = points().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)));
+    let sum: f64 = points().zip(after.control.iter().flatten()).map(|(a, b)| a.distance(*b)).sum();
+    sum / points().count() as f64 / low.distance(high)
+}
+
+/// The bases in a folder of the release.
+///
+/// # Errors
+/// [`CommandError`] naming the file.
+pub(super) fn bases(folder: &Path) -> Result<Bases, CommandError> {
+    let parts = read(folder, FILES)?;
+    Bases::read([&parts[0], &parts[1], &parts[2]]).map_err(|error| refused(folder, &error))
+}
+
+fn read(folder: &Path, names: [&str; 3]) -> Result<Vec<Vec<u8>>, CommandError> {
+    names.iter().map(|name| files::read(&folder.join(name))).collect()
+}
+
+fn refused(folder: &Path, error: &ReleaseError) -> CommandError {
+    let mut refused = CommandError::failed("release", error);
+    refused.message = format!("{}: {}", folder.display(), refused.message);
+    refused
+}
