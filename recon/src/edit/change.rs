@@ -162,13 +162,16 @@ pub fn bend(plant: &Plant, species: &Species, of: Selection, factor: f64) -> Res
     if !factor.is_finite() {
         return Err(EditError::Number { what: "bend", expected: "a finite factor", found: factor });
     }
+    let basis = &species.stem.deform;
+    // The γ that is nearest to no angle at all.
+    let straight = basis.project(&(basis.mean() * 0.0));
     let mut after = plant.clone();
     for (index, organ) in after.organs.iter_mut().enumerate().filter(|(index, organ)| of.has(*index, organ)) {
         match &mut organ.form {
             Form::Stem { gamma, .. } => {
                 // The angles are scaled, not γ: where the mean stem is bent, γ = 0 is not straight.
-                let basis = &species.stem.deform;
-                let bent = basis.project(&(basis.at(gamma) * factor)).into_iter().enumerate();
+                let straight = straight.iter().enumerate();
+                let bent = straight.map(|(k, s)| (k, s + factor * (gamma.get(k).copied().unwrap_or(0.0) - s)));
                 *gamma = bent.map(|(k, c)| within(index, "gamma", k, c)).collect::<Result<_, _>>()?;
             }
             Form::Leaf { .. } if matches!(of, Selection::Organ(_) | Selection::Leaves) => {
