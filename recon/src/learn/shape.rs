@@ -36,10 +36,9 @@ pub enum GridKind {
 impl GridKind {
     /// The kind for a species: oval when nearly all of its leaves are.
     #[must_use]
-    pub fn of<'a>(outlines: impl ExactSizeIterator<Item = &'a Outline>) -> Self {
-        let all = outlines.len() as f64;
-        let ovals = outlines.filter(|outline| oval(outline).is_ok()).count() as f64;
-        if ovals >= OVAL_SHARE * all { Self::Oval } else { Self::Harmonic }
+    pub fn of(outlines: &[&Outline]) -> Self {
+        let ovals = outlines.iter().filter(|outline| oval(outline).is_ok()).count() as f64;
+        if ovals >= OVAL_SHARE * outlines.len() as f64 { Self::Oval } else { Self::Harmonic }
     }
 
     /// The grid `[45*43]` of an outline.

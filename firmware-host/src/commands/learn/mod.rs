@@ -7,7 +7,10 @@ use crate::output::Output;
 
 mod adapt;
 mod clouds;
+mod contours;
 mod deform;
+mod masks;
+mod shape;
 
 /// Arguments of `demeter learn`.
 #[derive(Debug, clap::Args)]
@@ -18,6 +21,8 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum What {
+    /// Flat leaf shapes, from masks of scans.
+    Shape(shape::Args),
     /// How blades and stems bend and how organs hang, from clouds of plants or of single leaves.
     Deform(deform::Args),
     /// A related species' shape, bends and priors, refined on a handful of plants or leaves.
@@ -30,6 +35,7 @@ enum What {
 /// [`CommandError`] when nothing can be learned or a file cannot be read or written.
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     match &args.what {
+        What::Shape(args) => shape::run(args, output),
         What::Deform(args) => deform::run(args, output),
         What::Adapt(args) => adapt::run(args, output),
     }
