@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::hanger::{Hanger, relative};
 use super::stem::StemFit;
+use super::whole::Evidence;
 use super::{FitError, OrganFit, leaf, stem};
 use crate::cloud::diagonal;
 use crate::model::kinematics::Similarity;
@@ -22,6 +23,8 @@ pub(super) struct Builder<'a> {
     up: DVec3,
     pub organs: Vec<Organ>,
     pub fits: Vec<OrganFit>,
+    /// What each organ was fitted to.
+    pub evidence: Vec<Evidence<'a>>,
     /// The stem that each organ is, `None` for blades.
     hangers: Vec<Option<Hanger>>,
     /// Petioles that were put in: their organ and their far end.
@@ -40,32 +43,41 @@ pub(super) struct Source<'a> {
 
 impl<'a> Builder<'a> {
     /// A plant of its main stem alone, which starts at `ground`.
-    pub(super) fn new(main: Source<'_>, ground: Similarity, species: &'a Species, up: DVec3) -> Self {
-        let mut builder =
-            Self { species, up, organs: Vec::new(), fits: Vec::new(), hangers: Vec::new(), petioles: Vec::new() };
+    pub(super) fn new(main: Source<'a>, ground: Similarity, species: &'a Species, up: DVec3) -> Self {
+        let mut builder = Self {
+            species,
+            up,
+            organs: Vec::new(),
+            fits: Vec::new(),
+            evidence: Vec::new(),
+            hangers: Vec::new(),
+            petioles: Vec::new(),
+        };
         let fit = stem::fit(main.points, ground.translation, species);
         builder.add_stem(None, 0.0, ground, &fit, Some(main));
         builder
     }
 
     /// Hangs an organ on a stem of the plant, over a petiole where one must have been; gives its index.
-    pub(super) fn hang(&mut self, parent: usize, source: Source<'_>) -> Result<usize, FitError> {
+    pub(super) fn hang(&mut self, parent: usize, source: Source<'a>) -> Result<usize, FitError> {
         let hanger = self.hanger(parent, source)?;
-        let foot = hanger.foot(source.points);
-        let d = hanger.nearest(foot);
+        let d = hanger.root(source.points);
         let joint = hanger.joint(d);
         if source.kind != OrganKind::Leaf {
             let fit = stem::fit(source.points, joint.translation, self.species);
             return Ok(self.add_stem(Some(parent), d, joint, &fit, Some(source)));
         }
+        let foot = hanger.foot(source.points);
         let size = diagonal(source.points).unwrap_or(0.0);
         let radius = hanger.radius;
         let apart = |joint: Similarity, radius: f64| foot.distance(joint.translation) - radius > BRIDGE_SHARE * size;
-        if self.species.habit == Habit::Grass || !apart(joint, radius) {
+        let nearest = hanger.nearest(foot);
+        let beside = hanger.joint(nearest);
+        if self.species.habit == Habit::Grass || !apart(beside, radius) {
             return Ok(self.add_leaf(parent, d, joint, source));
         }
         let Some(petiole) = self.shared_petiole(foot, size) else {
-            let petiole = self.bridge(parent, d, joint, foot, radius);
+            let petiole = self.bridge(parent, nearest, beside, foot, radius);
             self.petioles.push((petiole, foot));
             return self.add_leaf_at_end(petiole, source);
         };
@@ -78,7 +90,7 @@ impl<'a> Builder<'a> {
         self.add_leaf_at_end(petiolule, source)
     }
 
-    fn hanger(&self, parent: usize, source: Source<'_>) -> Result<&Hanger, FitError> {
+    fn hanger(&self, parent: usize, source: Source<'a>) -> Result<&Hanger, FitError> {
         let missing = PlantError::LeafParent { organ: source.organ, parent };
         Ok(self.hangers[parent].as_ref().ok_or(missing)?)
     }
@@ -103,7 +115,7 @@ impl<'a> Builder<'a> {
         d: f64,
         joint: Similarity,
         fit: &StemFit,
-        source: Option<Source<'_>>,
+        source: Option<Source<'a>>,
     ) -> usize {
         self.hangers.push(Some(Hanger::of(fit, joint.translation, self.species)));
         self.organs.push(Organ {
@@ -111,6 +123,7 @@ impl<'a> Builder<'a> {
             joint: Joint { d, rotation: relative(joint.rotation, fit.rotation), scale: fit.length / joint.scale },
             form: Form::Stem { gamma: fit.gamma.clone(), radius: fit.radius / fit.length },
         });
+        self.evidence.push(Evidence { points: source.map_or(&[], |s| s.points), radius_known: fit.radius_known });
         self.fits.push(OrganFit {
             source: source.map(|s| s.organ),
             points: source.map_or(0, |s| s.points.len()),
@@ -121,12 +134,12 @@ impl<'a> Builder<'a> {
         self.organs.len() - 1
     }
 
-    fn add_leaf_at_end(&mut self, parent: usize, source: Source<'_>) -> Result<usize, FitError> {
+    fn add_leaf_at_end(&mut self, parent: usize, source: Source<'a>) -> Result<usize, FitError> {
         let joint = self.hanger(parent, source)?.joint(1.0);
         Ok(self.add_leaf(parent, 1.0, joint, source))
     }
 
-    fn add_leaf(&mut self, parent: usize, d: f64, joint: Similarity, source: Source<'_>) -> usize {
+    fn add_leaf(&mut self, parent: usize, d: f64, joint: Similarity, source: Source<'a>) -> usize {
         let fit = leaf::fit(source.points, joint.translation, self.up, self.species);
         self.hangers.push(None);
         self.organs.push(Organ {
@@ -134,6 +147,7 @@ impl<'a> Builder<'a> {
             joint: Joint { d, rotation: relative(joint.rotation, fit.rotation), scale: fit.length / joint.scale },
             form: Form::Leaf { blade: fit.blade, leaf: 0 },
         });
+        self.evidence.push(Evidence { points: source.points, radius_known: false });
         self.fits.push(OrganFit {
             source: Some(source.organ),
             points: source.points.len(),

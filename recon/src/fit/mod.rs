@@ -1,5 +1,5 @@
-//! From an organ tree to a plant of the Demeter model: stems first, each hung exactly on its parent, then blades
-//! (spec/reconstruction.md "Fitting").
+//! From an organ tree to a plant of the Demeter model (spec/reconstruction.md "Fitting"): each organ alone, hung exactly
+//! on its parent (stage 1), then all together (stage 2).
 //!
 //! The result is always inside the model: one connected tree, every base on its parent's curve, |β|, |γ| <= 3 σ. An
 //! organ that cannot be fitted is left out and said, and what it carries hangs on its parent.
@@ -11,10 +11,12 @@ mod hanger;
 mod leaf;
 pub(crate) mod leaflets;
 mod lone;
+mod loss;
 mod orient;
 pub(crate) mod solver;
 mod stem;
 mod tube;
+mod whole;
 
 use builder::{Builder, Source};
 use demeter_frame::Pose;
@@ -67,7 +69,7 @@ pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, F
     let few: Vec<Vec<DVec3>> = tree.organs.iter().map(|organ| thinned(&organ.points, MAX_POINTS)).collect();
     let source = |organ: usize| Source { organ, kind: tree.organs[organ].kind, points: &few[organ] };
     error::check(0, &few[0])?;
-    let base = hanger::lowest(&few[0], up);
+    let base = hanger::ground(&tree.organs[0].points, up);
     let world_from_plant = Pose::new(DQuat::from_rotation_arc(DVec3::Z, up), base);
     let ground = Similarity { rotation: world_from_plant.rotation, translation: base, scale: 1.0 };
     let mut builder = Builder::new(source(0), ground, species, up);
@@ -83,9 +85,11 @@ pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, F
         }));
     }
     leaflets::group(&mut builder.organs, species.habit);
-    let plant = Plant { world_from_plant, organs: builder.organs };
+    let mut plant = Plant { world_from_plant, organs: builder.organs };
+    let residuals = whole::refine(&mut plant, &builder.evidence, species)?;
     plant.validate()?;
-    for fit in &mut builder.fits {
+    for (fit, residual) in builder.fits.iter_mut().zip(residuals) {
+        fit.residual = residual;
         fit.points = fit.source.map_or(0, |organ| tree.organs[organ].points.len());
     }
     Ok(Fitted { plant, organs: builder.fits, dropped })

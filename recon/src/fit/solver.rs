@@ -2,27 +2,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// What one miss weighs and costs.
-#[derive(Clone, Copy)]
-pub(super) struct Loss {
-    pub weight: f64,
-    pub cost: f64,
-}
+/// A problem linearised at one state.
+pub(crate) trait Equations {
+    /// How far to move each parameter.
+    type Step;
 
-impl Loss {
-    /// Squared up to `sigma`, linear beyond (Huber); costs are in units of σ².
-    pub(super) fn huber(miss: f64, sigma: f64) -> Self {
-        let r = miss.abs() / sigma;
-        if r <= 1.0 {
-            Self { weight: 1.0 / (sigma * sigma), cost: r * r }
-        } else {
-            Self { weight: 1.0 / (r * sigma * sigma), cost: 2.0 * r - 1.0 }
-        }
-    }
+    /// The cost at the state.
+    fn cost(&self) -> f64;
 
-    pub(super) fn times(self, share: f64) -> Self {
-        Self { weight: self.weight * share, cost: self.cost * share }
-    }
+    /// The step that minimises the damped quadratic model, `None` when it has none.
+    fn step(&self, damping: f64) -> Option<Self::Step>;
 }
 
 /// Normal equations of a weighted least-squares problem at one state.
@@ -67,8 +56,15 @@ impl Normal {
     pub(super) fn without_first(self, held: usize) -> Self {
         Self { h: self.h.remove_rows(0, held).remove_columns(0, held), g: self.g.remove_rows(0, held), cost: self.cost }
     }
+}
 
-    /// The step that minimises the damped quadratic model, `None` when it has none.
+impl Equations for Normal {
+    type Step = DVector<f64>;
+
+    fn cost(&self) -> f64 {
+        self.cost
+    }
+
     fn step(&self, damping: f64) -> Option<DVector<f64>> {
         let mut h = self.h.clone();
         h.fill_lower_triangle_with_upper_triangle();
@@ -83,11 +79,11 @@ impl Normal {
 /// Minimises from `state`; `normal` linearises (and finds correspondences anew), `apply` takes a step inside the
 /// model. A step is kept only when the newly matched cost falls. True when the cost stopped falling before the
 /// iterations ran out.
-pub(crate) fn minimise<S: Clone>(
+pub(crate) fn minimise<S: Clone, E: Equations>(
     state: &mut S,
     iterations: usize,
-    normal: impl Fn(&S) -> Normal,
-    apply: impl Fn(&S, &DVector<f64>) -> S,
+    normal: impl Fn(&S) -> E,
+    apply: impl Fn(&S, &E::Step) -> S,
 ) -> bool {
     // Relative fall of the cost below which a fit has converged.
     const TOLERANCE: f64 = 1e-4;
@@ -100,8 +96,8 @@ pub(crate) fn minimise<S: Clone>(
         };
         let candidate = apply(state, &step);
         let there = normal(&candidate);
-        if there.cost.is_finite() && there.cost < at.cost {
-            let fall = (at.cost - there.cost) / at.cost.max(f64::MIN_POSITIVE);
+        if there.cost().is_finite() && there.cost() < at.cost() {
+            let fall = (at.cost() - there.cost()) / at.cost().max(f64::MIN_POSITIVE);
             *state = candidate;
             at = there;
             damping = (damping * 0.3).max(1e-6);

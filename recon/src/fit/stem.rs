@@ -4,7 +4,8 @@ use glam::{DQuat, DVec3};
 use nalgebra::DVector;
 
 use super::centreline::{angles_along, course, length, resample};
-use super::solver::{Loss, minimise};
+use super::loss::Loss;
+use super::solver::minimise;
 use super::tube::{Rows, Tube, TubeData};
 use crate::cloud::thinned;
 use crate::model::Species;
@@ -35,6 +36,8 @@ pub(super) struct StemFit {
     pub gamma: Vec<f64>,
     /// Radius, metres.
     pub radius: f64,
+    /// Whether the points tell the radius: half a tube does, a strip along it does not.
+    pub radius_known: bool,
     /// Mean distance of the points to the tube, metres.
     pub residual: f64,
     pub converged: bool,
@@ -48,16 +51,17 @@ pub(super) fn fit(points: &[DVec3], base: DVec3, species: &Species) -> StemFit {
     let offsets = few.iter().map(|p| distance_to_path(*p, &axis)).collect();
     let radius = quantile(offsets, RADIUS_QUANTILE).unwrap_or(0.0);
     tube.log_radius = species.ranges.stem_radius.clamp(radius).ln();
-    let data = TubeData::new(points, tube.log_radius, false);
+    let data = TubeData::new(points, &tube);
     let mut thin = tube.clone();
     let mut converged = onto(&mut tube, &data, species);
     let data = data.with_radius_held();
     let thin_converged = onto(&mut thin, &data, species);
-    if data.chamfer(&thin, species) < data.chamfer(&tube, species) {
+    let radius_known = data.chamfer(&tube, species) <= data.chamfer(&thin, species);
+    if !radius_known {
         (tube, converged) = (thin, thin_converged);
     }
     let misses = data.misses(&tube, species);
-    StemFit { residual: mean(misses.iter().copied()), converged, ..StemFit::of(&tube, species) }
+    StemFit { residual: mean(misses.iter().copied()), radius_known, converged, ..StemFit::of(&tube, species) }
 }
 
 /// Moves a tube onto its points; true when that converged.
@@ -77,13 +81,14 @@ pub(super) fn fit_path(path: &[DVec3], species: &Species) -> StemFit {
 }
 
 impl StemFit {
-    fn of(tube: &Tube, species: &Species) -> Self {
+    pub(super) fn of(tube: &Tube, species: &Species) -> Self {
         let raw = species.stem.jacobian(&tube.gamma).points;
         Self {
             rotation: (tube.rotation * gauge(&raw).inverse()).normalize(),
             length: tube.metres(),
             gamma: tube.gamma.clone(),
             radius: tube.radius(),
+            radius_known: false,
             residual: 0.0,
             converged: true,
         }
@@ -152,4 +157,12 @@ pub(super) fn quantile(mut x: Vec<f64>, share: f64) -> Option<f64> {
 pub(super) fn mean(x: impl ExactSizeIterator<Item = f64>) -> f64 {
     let n = x.len().max(1);
     x.sum::<f64>() / n as f64
+}
+
+/// Where points begin, from how far along each is: of even points, the first is as far before the share `near` of them
+/// as that is before the share `far`. Resists strays and noise as the least of them does not.
+pub(super) fn first(along: Vec<f64>, [near, far]: [f64; 2]) -> f64 {
+    let least = along.iter().copied().fold(f64::INFINITY, f64::min);
+    let [near, far] = [near, far].map(|share| quantile(along.clone(), share).unwrap_or(0.0));
+    (2.0 * near - far).max(least)
 }

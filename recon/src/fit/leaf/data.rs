@@ -6,7 +6,7 @@ use crate::fit::stem::median;
 use crate::nearest::{Nearest, Neighbour};
 
 /// Points with what the fit asks of them again and again.
-pub(super) struct Data {
+pub(in crate::fit) struct Data {
     pub points: Vec<DVec3>,
     pub tree: Nearest,
     /// Distance to the seventh neighbour, the median over the points: what one cannot see between, metres.
@@ -15,7 +15,7 @@ pub(super) struct Data {
 
 impl Data {
     /// At most `most` of the points, evenly.
-    pub(super) fn thinned(points: &[DVec3], most: usize) -> Self {
+    pub(in crate::fit) fn thinned(points: &[DVec3], most: usize) -> Self {
         let stride = points.len().div_ceil(most).max(1);
         let points: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
         let tree = Nearest::of(&points);

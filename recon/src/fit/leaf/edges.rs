@@ -5,8 +5,9 @@
 
 use glam::DVec3;
 
-use super::equations::{Loss, Pulls};
+use super::equations::Pulls;
 use super::sheet::Sheet;
+use crate::fit::loss::Loss;
 
 /// Rows to either side over which the density beside a row's edge is taken.
 const NEIGHBOURS: usize = 2;

@@ -2,10 +2,11 @@
 
 use super::data::Data;
 use super::edges::Edges;
-use super::equations::{Loss, Pulls};
+use super::equations::Pulls;
 use super::seen::Seen;
 use super::sheet::Sheet;
 use super::state::State;
+use crate::fit::loss::Loss;
 use crate::fit::solver::Normal;
 use crate::model::leaf::Lattice;
 use crate::model::{Habit, Species};

@@ -1,12 +1,12 @@
 //! One blade alone: pose, size, shape and deformation by damped Gauss-Newton on both directions of the Chamfer
 //! distance, robustly and with priors on β and γ (paper eq. 7; stage 1 of spec/reconstruction.md).
 
-mod data;
+pub(super) mod data;
 mod edges;
 mod equations;
 mod level;
 mod seen;
-mod sheet;
+pub(super) mod sheet;
 mod starts;
 mod state;
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::model::leaf::Lattice;
 
 /// The nodes of a lattice in the world.
-pub(super) struct Sheet {
+pub(in crate::fit) struct Sheet {
     pub lattice: Lattice,
     pub points: Vec<DVec3>,
     /// Unit normals of the upper side, by central differences.
@@ -16,7 +16,7 @@ pub(super) struct Sheet {
 
 impl Sheet {
     /// `points` are the lattice's, in the world.
-    pub(super) fn new(points: Vec<DVec3>, lattice: Lattice) -> Self {
+    pub(in crate::fit) fn new(points: Vec<DVec3>, lattice: Lattice) -> Self {
         let (normals, areas) = (normals(&points, lattice), areas(&points, lattice));
         Self { lattice, points, normals, areas }
     }
@@ -24,7 +24,7 @@ impl Sheet {
     /// The node nearest to `p`, found by walking downhill from the nearest of a few nodes, or from `near`: much cheaper
     /// than a search tree, and as a point stays on its part of the blade while the blade moves, a folded blade's points
     /// do not leap to the other half.
-    pub(super) fn nearest(&self, p: DVec3, near: Option<usize>) -> usize {
+    pub(in crate::fit) fn nearest(&self, p: DVec3, near: Option<usize>) -> usize {
         let (rows, columns) = (self.lattice.rows(), self.lattice.columns());
         let squared = |n: usize| self.points[n].distance_squared(p);
         let some = || (0..rows).step_by(3).flat_map(|row| (1..columns).step_by(3).map(move |j| row * columns + j));
@@ -47,14 +47,14 @@ impl Sheet {
         }
     }
 
-    pub(super) fn on_edge(&self, n: usize) -> bool {
+    pub(in crate::fit) fn on_edge(&self, n: usize) -> bool {
         let (row, column) = (n / self.lattice.columns(), n % self.lattice.columns());
         row == 0 || row == self.lattice.rows() - 1 || column == 0 || column == self.lattice.columns() - 1
     }
 
     /// Height of the surface above `p`, which is nearest to node `n`, along the normal half way between the node and
     /// the foot of `p`: exact for a parabola, where the node's own normal would take its sag for a miss.
-    pub(super) fn height_above(&self, n: usize, p: DVec3) -> f64 {
+    pub(in crate::fit) fn height_above(&self, n: usize, p: DVec3) -> f64 {
         let columns = self.lattice.columns();
         let (row, column) = (n / columns, n % columns);
         let (down, up) =

@@ -7,8 +7,9 @@ use glam::{DQuat, DVec3};
 
 use super::{Rows, Tube};
 use crate::cloud::thinned;
-use crate::fit::solver::{Loss, Normal};
-use crate::fit::stem::{mean, median, nearest_on, quantile};
+use crate::fit::loss::Loss;
+use crate::fit::solver::Normal;
+use crate::fit::stem::{first, mean, median, nearest_on};
 use crate::model::Species;
 use crate::model::stem::{BONES, POINTS};
 use crate::nearest::{Nearest, Neighbour};
@@ -17,9 +18,8 @@ use crate::nearest::{Nearest, Neighbour};
 const MAX_POINTS: usize = 400;
 /// Independent observations that a stem's points amount to: neighbours err together (a guess).
 const INDEPENDENT: f64 = 100.0;
-/// Shares of the points nearest to an end of a stem. Where points are even, the end is as far before the first as the
-/// second is behind it, which resists strays and noise as the outermost point does not.
-const END_SHARES: [f64; 2] = [0.03, 0.06];
+/// Shares of the points nearest to a stem's tip, see [`first`].
+const END_SHARES: [f64; 2] = [0.02, 0.04];
 /// Least standard deviation of points about a tube, as a share of its length: stems are not quite round (a guess).
 const NEAR: f64 = 0.0005;
 /// Directions about the axis in which a tube's surface looks for points.
@@ -37,8 +37,8 @@ pub(in crate::fit) struct TubeData {
     log_radius: f64,
     /// How firmly the radius is held to the guess: 1 for a guess that may be wrong e times.
     stiffness: f64,
-    /// Whether the stem's base is where its points begin; else it is inside its parent.
-    is_main: bool,
+    /// Where the stem starts: along its axis it stays there.
+    base: DVec3,
 }
 
 /// Where a point lies along a tube.
@@ -52,12 +52,13 @@ struct Beside {
 }
 
 impl TubeData {
-    pub(in crate::fit) fn new(points: &[DVec3], log_radius: f64, is_main: bool) -> Self {
+    /// `start` is the tube as first guessed.
+    pub(in crate::fit) fn new(points: &[DVec3], start: &Tube) -> Self {
         let points = thinned(points, MAX_POINTS);
         let search = Nearest::of(&points);
         let apart = |p: &DVec3| search.k(*p, 4).last().map(Neighbour::distance);
         let spacing = median(points.iter().step_by(5).filter_map(apart).collect()).unwrap_or(0.0).max(1e-6);
-        Self { points, search, spacing, log_radius, stiffness: 1.0, is_main }
+        Self { points, search, spacing, log_radius: start.log_radius, stiffness: 1.0, base: start.base }
     }
 
     /// The same with the radius as first guessed, whatever the points say.
@@ -125,16 +126,14 @@ impl TubeData {
             }
         }
         let share = INDEPENDENT / POINTS as f64;
-        let along: Vec<f64> = beside.iter().map(|b| b.along).collect();
-        let mut end = |bone: usize, t: f64, miss: f64| {
-            let sigma = sigma.max(self.spacing / 2.0);
-            let direction = rows.direction(bone);
-            rows.pull((bone, t), direction, miss, 0.0, Loss::huber(miss, sigma).times(share));
+        let (foot, tip) = (rows.direction(0), rows.direction(BONES - 1));
+        let end_sigma = sigma.max(self.spacing / 2.0);
+        let mut end = |bone: usize, t: f64, direction: DVec3, miss: f64| {
+            rows.pull((bone, t), direction, miss, 0.0, Loss::huber(miss, end_sigma).times(share));
         };
-        end(BONES - 1, 1.0, tube.metres() + first(along.iter().map(|x| -x)));
-        if self.is_main {
-            end(0, 0.0, -first(along.into_iter()));
-        }
+        let beyond = tube.metres() + first(beside.iter().map(|b| -b.along).collect(), END_SHARES);
+        end(BONES - 1, 1.0, tip, beyond);
+        end(0, 0.0, foot, (tube.base - self.base).dot(foot));
         // The axis stays where points are beside it; the radius is no matter here, so that gaps do not swell stems.
         let reach = self.log_radius.exp() + BESIDE * self.spacing;
         for bone in 0..BONES - 1 {
@@ -148,12 +147,4 @@ impl TubeData {
         }
         rows.finish(self.log_radius, self.stiffness)
     }
-}
-
-/// Where points begin, from how far along each is.
-fn first(along: impl Iterator<Item = f64>) -> f64 {
-    let along: Vec<f64> = along.collect();
-    let least = along.iter().copied().fold(f64::INFINITY, f64::min);
-    let [near, far] = END_SHARES.map(|share| quantile(along.clone(), share).unwrap_or(0.0));
-    (2.0 * near - far).max(least)
 }

@@ -7,7 +7,8 @@ mod tests;
 pub(super) use data::TubeData;
 use glam::{DQuat, DVec3};
 
-use super::solver::{Loss, Normal};
+use super::loss::Loss;
+use super::solver::Normal;
 use super::stem::clipped;
 use crate::model::stem::{BONES, StemJacobian};
 use crate::model::{Range, Ranges, Species};
