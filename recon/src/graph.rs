@@ -114,31 +114,40 @@ impl CloudGraph {
     /// Shortest distance along the graph from any of `seeds`, metres.
     #[must_use]
     pub fn distances(&self, seeds: &[usize]) -> Vec<f64> {
-        let mut distance = vec![f64::INFINITY; self.edges.len()];
-        let mut heap = BinaryHeap::new();
-        for &s in seeds {
-            distance[s] = 0.0;
-            heap.push(Reverse((Metres(0.0), s as u32)));
-        }
-        while let Some(Reverse((Metres(d), i))) = heap.pop() {
-            if d > distance[i as usize] {
-                continue;
-            }
-            for &(j, metres) in &self.edges[i as usize] {
-                let through = d + metres;
-                if through < distance[j as usize] {
-                    distance[j as usize] = through;
-                    heap.push(Reverse((Metres(through), j)));
-                }
-            }
-        }
-        distance
+        shortest(self.edges.len(), seeds, |i| self.edges[i].iter().map(|(j, metres)| (*j as usize, *metres)))
     }
 
     /// Neighbours of a point.
     pub fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         self.edges[i].iter().map(|(j, _)| *j as usize)
     }
+}
+
+/// Shortest distance from any of `seeds` over edges (neighbour, metres), infinite where no way leads (Dijkstra).
+pub(crate) fn shortest<I: Iterator<Item = (usize, f64)>>(
+    count: usize,
+    seeds: &[usize],
+    edges: impl Fn(usize) -> I,
+) -> Vec<f64> {
+    let mut distance = vec![f64::INFINITY; count];
+    let mut heap = BinaryHeap::new();
+    for &s in seeds {
+        distance[s] = 0.0;
+        heap.push(Reverse((Metres(0.0), s as u32)));
+    }
+    while let Some(Reverse((Metres(d), i))) = heap.pop() {
+        if d > distance[i as usize] {
+            continue;
+        }
+        for (j, metres) in edges(i as usize) {
+            let through = d + metres;
+            if through < distance[j] {
+                distance[j] = through;
+                heap.push(Reverse((Metres(through), j as u32)));
+            }
+        }
+    }
+    distance
 }
 
 /// Connected pieces of the points that `keep` admits, in order of their lowest index.

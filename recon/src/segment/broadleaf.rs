@@ -3,11 +3,11 @@
 
 use glam::DVec3;
 
-use super::{MIN_ORGAN_POINTS, grain, nearest_to, organ, stems};
+use super::{MIN_ORGAN_POINTS, blades, grain, nearest_to, organ, stems};
 use crate::axes::PrincipalAxes;
-use crate::graph::{CloudGraph, Skeleton, pieces, prune};
+use crate::graph::pieces;
 use crate::model::{Habit, OrganKind};
-use crate::nearest::Nearest;
+use crate::nearest::{Nearest, Neighbour};
 use crate::organs::OrganCloud;
 
 /// Radius of the neighbourhoods that are judged, as a share of the bounding box diagonal: wider than stems are
@@ -17,10 +17,18 @@ const SCALE_SHARE: f64 = 0.025;
 const STEM_FLATNESS: f64 = 0.42;
 /// Third over second standard deviation of a neighbourhood above which it is a thicket of stems and not a blade.
 const LEAF_THICKNESS: f64 = 0.45;
-/// A path within a cluster of blades that is at least this share of its longest is a blade of its own.
-const LEAFLET_SHARE: f64 = 0.4;
 /// Cosine of the largest angle between neighbouring normals of one leaf (35°).
 const SAME_LEAF_COSINE: f64 = 0.82;
+/// The same above which stem points are heaped and no line.
+const BALL_FLATNESS: f64 = 0.6;
+/// Share of a heap's points that may lie beside lines (a guess).
+const BALL_CONTACT: f64 = 0.3;
+/// Nearest points that alone may show a sheet, or all within half the radius where they are more.
+const FEW: usize = 15;
+/// Farthest neighbour in a sheet, in grains: a sheet's 15th is at 1.2.
+const SHEET_REACH: f64 = 1.6;
+/// Largest piece of a stem that may pass for a sheet, as a share of the largest blade's points (a guess).
+const PATCH_SHARE: f64 = 0.2;
 /// Neighbours whose votes smooth the classes.
 const VOTERS: usize = 15;
 
@@ -41,25 +49,62 @@ pub(super) fn segment(points: &[DVec3], foot: DVec3, habit: Habit) -> Vec<OrganC
     for n in search.within(points[base], radius) {
         is_stem[n.index] = true;
     }
-    let shapes = &shapes;
-    let joined = |i: usize| {
-        near[i].iter().copied().filter(move |j| {
-            points[i].distance(points[*j]) < 2.5 * grain
-                && shapes[i].normal.dot(shapes[*j].normal).abs() > SAME_LEAF_COSINE
-        })
-    };
-    let clusters = pieces(points.len(), joined, |i| !is_stem[i]);
     let least = MIN_ORGAN_POINTS.max(points.len() / 400);
-    let (leaves, crumbs): (Vec<_>, Vec<_>) = clusters.into_iter().partition(|c| c.len() >= least);
+    let balls = balls(points, &near, &shapes, &is_stem, SHEET_REACH * grain);
+    let balls: Vec<Vec<usize>> = balls.into_iter().filter(|ball| ball.len() >= least).collect();
+    let mut in_ball = vec![false; points.len()];
+    for i in balls.iter().flatten() {
+        (in_ball[*i], is_stem[*i]) = (true, false);
+    }
+    let joined = |i: usize| {
+        let same = |j: &usize| {
+            !is_stem[*j]
+                && !in_ball[*j]
+                && points[i].distance(points[*j]) < SHEET_REACH * grain
+                && shapes[i].normal.dot(shapes[*j].normal).abs() > SAME_LEAF_COSINE
+        };
+        (!is_stem[i] && !in_ball[i]).then(|| near[i].iter().copied().filter(same).collect())
+    };
+    let sheets: Vec<Option<Vec<usize>>> = (0..points.len()).map(joined).collect();
+    let normals: Vec<DVec3> = shapes.iter().map(|shape| shape.normal).collect();
+    let (blades, edge) = blades::apart(points, &normals, &sheets, grain);
+    // A piece of a thick stem's surface is a sheet too, but a small one, and its edge is not free.
+    let largest = blades.iter().map(Vec::len).max().unwrap_or(0) as f64;
+    let by_stem = |i: &usize| near[*i].iter().any(|j| is_stem[*j]);
+    let is_blade = |blade: &Vec<usize>| {
+        let free = blade.iter().filter(|i| edge[**i] && !by_stem(i)).count();
+        blade.len() as f64 > PATCH_SHARE * largest || free >= blade.iter().filter(|i| by_stem(i)).count()
+    };
+    let (blades, patches): (Vec<_>, Vec<_>) = blades.into_iter().partition(is_blade);
+    patches.concat().into_iter().for_each(|i| is_stem[i] = true);
+    let (mut blades, crumbs): (Vec<_>, Vec<_>) = blades.into_iter().partition(|c| c.len() >= least);
+    blades.extend(balls);
     let stems: Vec<usize> = (0..points.len()).filter(|i| is_stem[*i]).collect();
-    let (leaves, stems) = adopt(points, leaves, stems, crumbs.concat());
-    let stem_points: Vec<DVec3> = stems.iter().map(|i| points[*i]).collect();
-    let stem_search = Nearest::of(&stem_points);
-    let blades: Vec<Vec<usize>> =
-        leaves.into_iter().flat_map(|cluster| split_blades(points, cluster, &stem_search, grain)).collect();
+    let (blades, stems) = adopt(points, blades, stems, crumbs.concat());
     let mut organs = stems::split(points, &stems, &blades, foot, habit);
     organs.extend(blades.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
     organs
+}
+
+/// Leaves that are no sheets, crumpled or just unfolding: compact heaps of stem points that are no lines, at the end
+/// of what they hang on.
+fn balls(
+    points: &[DVec3],
+    near: &[Vec<usize>],
+    shapes: &[Neighbourhood],
+    is_stem: &[bool],
+    reach: f64,
+) -> Vec<Vec<usize>> {
+    let heaped = |i: usize| is_stem[i] && shapes[i].flatness > BALL_FLATNESS;
+    let joined = |i: usize| near[i].iter().copied().filter(move |j| points[i].distance(points[*j]) < reach);
+    let mut found = pieces(points.len(), joined, heaped);
+    found.retain(|piece| {
+        let sd = PrincipalAxes::of(piece.iter().map(|i| points[*i])).deviation;
+        let by_line = |i: &&usize| near[**i].iter().any(|j| is_stem[*j] && !heaped(*j));
+        let lines = piece.iter().filter(by_line).count() as f64;
+        sd[1] > STEM_FLATNESS * sd[0] && lines < BALL_CONTACT * piece.len() as f64
+    });
+    found
 }
 
 /// The shape of a cloud around a point.
@@ -77,21 +122,17 @@ fn neighbourhood(points: &[DVec3], search: &Nearest, p: DVec3, radius: f64) -> N
     if found.len() < 8 {
         found = search.k(p, 8);
     }
-    let PrincipalAxes { axes, deviation: sd, .. } = PrincipalAxes::of(found.iter().map(|f| points[f.index]));
-    Neighbourhood { flatness: sd[1] / sd[0].max(1e-12), thickness: sd[2] / sd[1].max(1e-12), normal: axes.z_axis }
-}
-
-/// Takes apart blades that touch at their bases: seen along the cluster from where it meets its stem, each is a path
-/// of its own.
-fn split_blades(points: &[DVec3], members: Vec<usize>, stems: &Nearest, grain: f64) -> Vec<Vec<usize>> {
-    let own: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
-    let from_stem = |i: usize| stems.one(own[i]).map_or(f64::INFINITY, |n| n.distance_squared);
-    let base = (0..own.len()).fold(0, |best, i| if from_stem(i) < from_stem(best) { i } else { best });
-    let graph = CloudGraph::new(&own);
-    let reach = graph.distances(&[base]).into_iter().fold(0.0, f64::max);
-    let branches = Skeleton::of(&own, &graph, base, 1.5 * grain).branches(|_, length| length);
-    let blades = prune(branches, &own, LEAFLET_SHARE * reach);
-    blades.into_iter().map(|b| b.members.into_iter().map(|i| members[i]).collect()).collect()
+    let axes_of = |found: &[Neighbour]| PrincipalAxes::of(found.iter().map(|f| points[f.index]));
+    let wide = axes_of(&found).deviation;
+    // Where blades cross or touch, the nearest points alone are of one of them.
+    let few = found.partition_point(|f| f.distance() < 0.5 * radius).max(FEW).min(found.len());
+    let PrincipalAxes { axes, deviation: close, .. } = axes_of(&found[..few]);
+    let thickness = |sd: [f64; 3]| sd[2] / sd[1].max(1e-12);
+    Neighbourhood {
+        flatness: wide[1] / wide[0].max(1e-12),
+        thickness: thickness(wide).min(thickness(close)),
+        normal: axes.z_axis,
+    }
 }
 
 /// Gives each crumb's points to the nearest leaf or stem.

@@ -1,6 +1,7 @@
 //! Clouds to organs (spec/reconstruction.md "Points to organs"): by labels where there are any, else by geometry.
 
 mod apart;
+mod blades;
 mod broadleaf;
 mod foot;
 mod grass;
