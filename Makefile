@@ -1,5 +1,5 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup build demo check fmt bench train
+.PHONY: setup build demo check fmt bench evaluation train
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
 IMAGES := .cache/training/images
@@ -30,6 +30,10 @@ fmt:
 # Times of the hot paths, in the profile that everything else shares.
 bench: setup
 	cargo bench --locked --workspace --profile dev --bench '*'
+
+# docs/evaluation.md: every table beside its goals. EVERY=10 takes every tenth cloud.
+evaluation: build
+	tools/evaluation.sh
 
 # Every network of models/ from pictures of the synthetic world: an hour, and the same command resumes a stopped run.
 train: build

@@ -99,8 +99,8 @@ fn bernstein(count: usize, t: f64) -> Vec<f64> {
     values
 }
 
-/// The surface z = a + bx + cy + dx² + exy + fy² over the plane that the points spread along, where their convex hull
-/// lies; empty when the points span nothing.
+/// The surface z = a + bx + cy + dx² + exy + fy² over the plane that the points spread along, of the cells that have a
+/// point within a cell's diagonal; empty when the points span nothing.
 #[must_use]
 pub fn quadratic(points: &[DVec3]) -> PlantMesh {
     let Some(frame) = Frame::of(points) else { return PlantMesh::default() };
@@ -114,33 +114,13 @@ pub fn quadratic(points: &[DVec3]) -> PlantMesh {
         sums += row * p.z;
     }
     let Some(coefficients) = normal.cholesky().map(|factor| factor.solve(&sums)) else { return PlantMesh::default() };
-    let hull = hull(local.iter().map(|p| p.truncate()).collect());
-    let inside =
-        |p: DVec2| (0..hull.len()).all(|i| (hull[(i + 1) % hull.len()] - hull[i]).perp_dot(p - hull[i]) >= 0.0);
     let place: Vec<DVec2> = grid().map(|(u, v)| frame.place(u, v)).collect();
+    let cell = (frame.high - frame.low) / DVec2::new(CELLS.0 as f64, CELLS.1 as f64);
+    let footprint = Nearest::of(&local.iter().map(|p| p.truncate().extend(0.0)).collect::<Vec<_>>());
+    let seen = |p: DVec2| footprint.one(p.extend(0.0)).is_some_and(|found| found.distance() < cell.length());
     let height = |p: DVec2| terms(p).dot(&coefficients);
     let positions = place.iter().map(|p| frame.world(p.extend(height(*p)))).collect();
-    sheet(positions, |quad| inside(quad.iter().map(|v| place[*v as usize]).sum::<DVec2>() / 4.0))
-}
-
-/// The convex hull counter-clockwise (Andrew's monotone chain).
-fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let mut hull: Vec<DVec2> = Vec::new();
-    let upper: Vec<DVec2> = points.iter().rev().copied().collect();
-    for half in [points, upper] {
-        let start = hull.len();
-        for p in half {
-            while let [.., a, b] = hull[start..]
-                && (b - a).perp_dot(p - b) <= 0.0
-            {
-                hull.pop();
-            }
-            hull.push(p);
-        }
-        hull.pop();
-    }
-    hull
+    sheet(positions, |quad| seen(quad.iter().map(|v| place[*v as usize]).sum::<DVec2>() / 4.0))
 }
 
 /// The box of a set of points along its principal axes.

@@ -112,7 +112,9 @@ mod tests {
         }
 
         #[test]
-        fn quantiles_grow_with_their_share(values in prop::collection::vec(-5.0..5.0_f64, 1..50), a in 0.0..1.0_f64, b in 0.0..1.0_f64) {
+        fn quantiles_grow_with_their_share(
+            values in prop::collection::vec(-5.0..5.0_f64, 1..50), a in 0.0..1.0_f64, b in 0.0..1.0_f64,
+        ) {
             let (low, high) = (quantile(&values, a.min(b)).unwrap(), quantile(&values, a.max(b)).unwrap());
             prop_assert!(low <= high);
             prop_assert_eq!(quantile(&values, 0.0).unwrap(), values.iter().copied().fold(f64::INFINITY, f64::min));

@@ -18,7 +18,7 @@ use crate::files;
 const PLACE: usize = 5;
 /// Bytes of a number of a baseline, kept as f32.
 const NUMBER_BYTES: usize = 4;
-/// Numbers of a quadratic patch: six of its height, two of its plane, four of its outline's box, its place apart.
+/// Numbers of a quadratic patch: six of its height, six of its plane's place and turn; its outline comes free.
 const QUADRATIC: usize = 12;
 
 /// How many free numbers our model has for an organ of this kind.

@@ -12,7 +12,7 @@ use glam::DVec3;
 use super::baselines::{beziers, poisson, procedural, quadratics};
 use super::clouds::{Fitted, read, some, species_of, whole};
 use super::table::{Cell, Table};
-use super::{files_of, folder, progress};
+use super::{files_of, folder, picture, progress};
 use crate::error::CommandError;
 use crate::files;
 
@@ -34,6 +34,10 @@ pub(super) struct Args {
     /// Also measure a dense screened-Poisson mesh: a Python that has what tools/poisson.py names.
     #[arg(long, value_name = "PYTHON")]
     poisson: Option<PathBuf>,
+    /// Draw each cloud beside the plant fitted to it into this folder. Pictures of the shared data stay out of the
+    /// project.
+    #[arg(long, value_name = "FOLDER")]
+    pictures: Option<PathBuf>,
 }
 
 /// Median CD with labels that issue 3 asks for, and the one without labels on real soybean 27_o.
@@ -125,6 +129,12 @@ impl Args {
         let labelled = cloud.labels.is_some();
         let (labels, best) = if labelled { (Labels::Own, LABELS) } else { (Labels::None, NO_LABELS) };
         let fitted = whole(cloud, species, labels, up);
+        if let (Ok(fitted), Some(folder)) = (&fitted, &self.pictures) {
+            let name = path.with_extension("png").file_name().map(|name| folder.join(name)).unwrap_or_default();
+            if let Err(error) = picture::write(&name, &cloud.points, fitted) {
+                found.push((best, Err(error)));
+            }
+        }
         if labelled {
             found.push((NO_LABELS, whole(cloud, species, Labels::None, up).and_then(|fitted| ours(&fitted))));
         }

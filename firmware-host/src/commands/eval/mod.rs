@@ -12,6 +12,8 @@ use crate::output::Output;
 mod baselines;
 mod clouds;
 mod fit;
+mod leaf;
+mod picture;
 mod table;
 mod topology;
 mod traits;
@@ -28,6 +30,8 @@ pub struct Args {
 enum Which {
     /// Chamfer distance and bytes of whole plants, with labels and without, beside baselines.
     Fit(fit::Args),
+    /// Chamfer distance and time of single blades, beside loose surfaces.
+    Leaf(leaf::Args),
     /// Share of organs with the right parent.
     Topology(topology::Args),
     /// Traits of the decoded record against a generator's truth.
@@ -41,6 +45,7 @@ enum Which {
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let table = match &args.table {
         Which::Fit(args) => fit::table(args)?,
+        Which::Leaf(args) => leaf::table(args)?,
         Which::Topology(args) => topology::table(args)?,
         Which::Traits(args) => traits::table(args)?,
     };

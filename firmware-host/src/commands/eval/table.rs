@@ -149,7 +149,10 @@ mod tests {
         let json = serde_json::to_string(&table).unwrap();
         assert_eq!(
             json,
-            r#"{"table":"fit","rows":[{"CD":0.00314,"clouds":17,"species":"maize"},{"CD":null,"clouds":0,"species":"sorghum"}],"notes":["one"]}"#
+            concat!(
+                r#"{"table":"fit","rows":[{"CD":0.00314,"clouds":17,"species":"maize"},"#,
+                r#"{"CD":null,"clouds":0,"species":"sorghum"}],"notes":["one"]}"#
+            )
         );
     }
 }

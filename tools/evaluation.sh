@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# Writes docs/evaluation.md: every table of `demeter eval` with its goals, then tools/evaluation-notes.md, what people
+# found in the pictures and profiles. Run by `make evaluation` beside ../shared; hours on every cloud.
+#   EVERY=N    takes every N-th cloud and plant
+#   HELIOS=F   folder with tools/helios/sets.sh's sets; made with .cache/helios/bin/python where it is missing
+#   POISSON=P  a Python with what tools/poisson.py names, for the dense mesh
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+every=${EVERY:-1}
+helios=${HELIOS:-.cache/helios/sets}
+demeter=target/debug/demeter
+[ -d "$helios/clean" ] || tools/helios/sets.sh "$helios"
+
+poisson=()
+[ -z "${POISSON:-}" ] || poisson=(--poisson "$POISSON")
+page=$(mktemp)
+{
+    cat <<END
+# Evaluation
+
+Made by \`make evaluation\` at commit $(git log -1 --format=%h$(git diff --quiet HEAD || echo +changes)), every ${every}. cloud or plant of each set; definitions are in
+spec/reconstruction.md "Metrics", goals in issue 3. Nothing was learned from or tuned on the shared clouds: they are for
+evaluation only. The program is built with the dev profile (opt-level 3), as everywhere.
+
+## Whole plants
+
+\`demeter eval fit --baselines\`: real scans of maize, sorghum, tobacco and tomato (organ-clouds) and one real soybean
+(27_o) without labels. SimpleProc is one procedural plant of 8 numbers; Bézier and quadratic are loose surfaces, one for
+each organ of the same division, that make no plant; screened Poisson is a dense mesh.
+
+END
+    "$demeter" eval fit --every "$every" --baselines "${poisson[@]}"
+    cat <<END
+
+## Single blades
+
+\`demeter eval leaf\`: each leaf of the same scans by itself, base and tip not given.
+
+END
+    "$demeter" eval leaf --every "$every"
+    for set in clean hard; do
+        cat <<END
+
+## Traits, $set
+
+\`demeter eval traits\` on 40 plants of pyhelios3d (tools/helios/sets.sh), labels given, 50,000 points on the solid
+surface$([ $set = clean ] || echo "; each coordinate has 5 mm of Gaussian noise and 30 % of the points are missing"). Traits come from the decoded compact record.
+
+END
+        "$demeter" eval traits --truth "$helios/$set" --every "$every"
+    done
+    cat <<END
+
+## Parents
+
+\`demeter eval topology\` on the clean plants, petioles and branches apart.
+
+END
+    "$demeter" eval topology --truth "$helios/clean"
+    echo
+    cat tools/evaluation-notes.md
+} >"$page"
+mv "$page" docs/evaluation.md
