@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use approx::assert_relative_eq;
-use demeter_recon::learn::shape::{FlatLeaf, GridKind, contour_error, equally_wide, learn, left_out};
+use demeter_recon::learn::shape::{FlatLeaf, GridKind, contour_error, equally_wide, learn, left_out, widthless};
 use demeter_recon::learn::{Ends, Outline, OutlineError, PcaError, Rejection, folded, harmonic, oval, rejections};
 use demeter_recon::model::leaf::{COLUMNS, ROWS, Side, node};
 use demeter_recon::species;
@@ -214,6 +214,11 @@ fn learned_shapes_keep_base_and_tip_and_foretell_leaves_they_have_not_seen() {
     // Equally wide, they are one leaf, and only a related species has components.
     let same = equally_wide(&leaves);
     assert!(contour_error(&same[0].outline, &same[39].grid) < 3e-3);
+    // The width's own direction is gone from what is left of a grass's components.
+    let grass = widthless(&species::generic("maize").unwrap().unwrap().leaf.shape).unwrap();
+    let by_width = grass.mean().iter().enumerate().map(|(k, x)| if k % 2 == 0 { *x } else { 0.0 });
+    let by_width = nalgebra::DVector::from_iterator(grass.dim(), by_width);
+    assert!((grass.components() * by_width).amax() < 1e-9);
     let few: Vec<&FlatLeaf> = same.iter().take(2).collect();
     assert_eq!(learn(&few, &related, 5).unwrap().basis.rank(), 5);
     assert_eq!(learn(&[], &related, 5).unwrap_err(), PcaError::Samples { expected: 1, found: 0 });

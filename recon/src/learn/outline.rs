@@ -122,7 +122,7 @@ pub struct Traced {
     pub outline: Outline,
     /// Area of what is not the leaf, as a share of the leaf.
     pub others: f64,
-    /// Share of the contour that lies on the picture's edge, where the leaf may be cut off.
+    /// Share of the contour in its longest stretch on the picture's edge, where the leaf may be cut off.
     pub on_edge: f64,
 }
 
@@ -227,10 +227,16 @@ pub(super) fn resampled(line: &[DVec2]) -> Vec<DVec2> {
     points
 }
 
-/// Share of a contour's points within a pixel of the picture's edge.
+/// The longest stretch of a contour within half a pixel of the picture's edge, as a share of its points.
 fn on_edge(contour: &[DVec2], region: &Region) -> f64 {
     let (width, height) = region.size();
-    let near = |x: f64, size: usize| x < 1.0 || x > size as f64 - 1.0;
-    let count = contour.iter().filter(|p| near(p.x, width) || near(-p.y, height)).count();
-    count as f64 / contour.len() as f64
+    let near = |x: f64, size: usize| x < 0.5 || x > size as f64 - 0.5;
+    let mut longest = 0;
+    let mut stretch = 0;
+    // Twice around, because a stretch may go over the contour's first point.
+    for p in contour.iter().chain(contour) {
+        stretch = if near(p.x, width) || near(-p.y, height) { stretch + 1 } else { 0 };
+        longest = longest.max(stretch);
+    }
+    longest.min(contour.len()) as f64 / contour.len() as f64
 }

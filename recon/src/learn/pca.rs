@@ -137,7 +137,7 @@ fn centre(samples: &DMatrix<f64>) -> Result<(DVector<f64>, DMatrix<f64>), PcaErr
 }
 
 /// The largest eigenpairs of the covariance RᵀR of a `factor` R `[M, N]`, through whichever of RRᵀ and RᵀR is smaller.
-fn principal(mean: DVector<f64>, factor: &DMatrix<f64>, components: usize) -> Result<Pca, PcaError> {
+pub(super) fn principal(mean: DVector<f64>, factor: &DMatrix<f64>, components: usize) -> Result<Pca, PcaError> {
     let (m, n) = factor.shape();
     if m.min(n) == 0 {
         return Err(PcaError::NoVariance);

@@ -9,7 +9,7 @@ use super::outline::{Outline, Traced};
 ///
 /// The rule, in order:
 /// 1. other regions than the leaf cover more than 1 % of its area;
-/// 2. more than 5 % of the contour lies on the picture's edge;
+/// 2. more than 10 % of the contour lies in one stretch on the picture's edge;
 /// 3. the base-tip line is shorter than 0.6 of the leaf's largest extent;
 /// 4. among at least 12 scans, a [`Measure`] is farther from the median than 3.5 robust
 ///    standard deviations (1.4826 times the median absolute deviation).
@@ -61,8 +61,8 @@ pub enum Measure {
 
 /// Share of the leaf's area that other regions may cover.
 const OTHERS_LIMIT: f64 = 0.01;
-/// Share of the contour that may lie on the picture's edge; a leaf that only touches it stays.
-const EDGE_LIMIT: f64 = 0.05;
+/// Share of the contour that may lie on the picture's edge in one stretch; leaves that only touch it stay.
+const EDGE_LIMIT: f64 = 0.1;
 /// Least base-tip distance over the largest extent (cordate and lobed leaves reach beyond their ends).
 const AXIS_LIMIT: f64 = 0.6;
 /// Robust standard deviations that pass: the usual 3.5 (Iglewicz and Hoaglin, How to Detect and Handle Outliers, 1993).

@@ -7,7 +7,7 @@ use super::contour::distance;
 use super::harmonic::harmonic;
 use super::outline::{Outline, OutlineError, resampled};
 use super::oval::oval;
-use super::pca::{Pca, PcaError, Prior, folds};
+use super::pca::{Pca, PcaError, Prior, folds, principal};
 use crate::model::leaf::{COLUMNS, ROWS, node};
 use crate::model::{Basis, Knots, refine};
 
@@ -100,6 +100,20 @@ impl FlatLeaf {
 pub fn equally_wide(leaves: &[FlatLeaf]) -> Vec<FlatLeaf> {
     let mean = leaves.iter().map(FlatLeaf::width).sum::<f64>() / leaves.len().max(1) as f64;
     leaves.iter().map(|leaf| leaf.widened(mean / leaf.width())).collect()
+}
+
+/// A grass's shapes without what they say of the width, for a `related` species whose blades were not equally wide.
+///
+/// # Errors
+/// [`PcaError`] when nothing but the width varies.
+pub fn widthless(shapes: &Basis) -> Result<Basis, PcaError> {
+    // The output's derivative by s_x: x where x stands, 0 where y does.
+    let mut by_width = shapes.mean().clone();
+    by_width.iter_mut().skip(1).step_by(2).for_each(|y| *y = 0.0);
+    let by_width = by_width.normalize();
+    let modes = DMatrix::from_diagonal(shapes.sigma()) * shapes.components();
+    let rest = &modes - (&modes * &by_width) * by_width.transpose();
+    Ok(principal(shapes.mean().clone(), &rest, shapes.rank())?.basis)
 }
 
 /// The shapes of a species from its leaves and their mirror images, at most `components` of them; with fewer than

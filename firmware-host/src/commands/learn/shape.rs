@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use demeter_recon::learn::shape::{FEW_SCANS, FlatLeaf, GridKind, equally_wide, learn, left_out};
+use demeter_recon::learn::shape::{FEW_SCANS, FlatLeaf, GridKind, equally_wide, learn, left_out, widthless};
 use demeter_recon::learn::{Ends, PcaError, rejections};
 use demeter_recon::model::{Habit, Species};
 
@@ -78,13 +78,21 @@ impl From<Base> for Ends {
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let from = files::species(&args.from)?;
-    let related = files::species(args.related.as_deref().unwrap_or(&args.from))?.leaf.shape;
+    let failed = |error: PcaError| CommandError::failed("learn", &error);
+    let is_grass = from.habit == Habit::Grass;
+    let relative = files::species(args.related.as_deref().unwrap_or(&args.from))?;
+    let related = relative.leaf.shape;
+    let related = if is_grass { widthless(&related).map_err(failed)? } else { related };
     let scans = scans(&args.masks, args.base.into())?;
     let (kind, kept, poor, rejected) = divided(&scans, args.grid);
+    if kept.is_empty() {
+        let reasons: Vec<String> = rejected.iter().map(|r| format!("{}: {}", r.file, r.reason)).collect();
+        let message = format!("expected at least one scan to learn from, found none; {}", reasons.join("; "));
+        return Err(CommandError { exit: Exit::Failed, kind: "learn", message, expected: None, found: None });
+    }
     let all: Vec<FlatLeaf> = kept.iter().chain(&poor).cloned().collect();
-    let [kept, all] = [kept, all].map(|leaves| if from.habit == Habit::Grass { equally_wide(&leaves) } else { leaves });
+    let [kept, all] = [kept, all].map(|leaves| if is_grass { equally_wide(&leaves) } else { leaves });
 
-    let failed = |error: PcaError| CommandError::failed("learn", &error);
     let components = usize::from(args.components);
     let shape = learn(&kept.iter().collect::<Vec<_>>(), &related, components).map_err(failed)?;
     let errors = |leaves: &[FlatLeaf]| match leaves.len() {
@@ -93,7 +101,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     };
     let curve = curve(&shape.explained, &errors(&kept).map_err(failed)?, &errors(&all).map_err(failed)?);
 
-    let provenance = provenance(args, &scans, &from, kept.len());
+    let provenance = provenance(args, &scans, &from, &relative.name, kept.len());
     let mut species = from;
     species.leaf.shape = shape.basis;
     species.provenance = provenance;
@@ -150,13 +158,10 @@ fn divided(scans: &Scans, grid: Grid) -> (GridKind, Vec<FlatLeaf>, Vec<FlatLeaf>
 }
 
 /// Where the shape comes from, then where the rest does.
-fn provenance(args: &Args, scans: &Scans, from: &Species, kept: usize) -> String {
-    let related = match &args.related {
-        Some(related) if kept < FEW_SCANS => format!(", components helped by {related}"),
-        _ => String::new(),
-    };
+fn provenance(args: &Args, scans: &Scans, from: &Species, relative: &str, kept: usize) -> String {
+    let helped = if kept < FEW_SCANS { format!(", beside the components of {relative}") } else { String::new() };
     format!(
-        "leaf shape of {kept} of {} scans ({}; BLAKE3 {}){related} by demeter learn shape --base {} --grid {} \
+        "leaf shape of {kept} of {} scans ({}; BLAKE3 {}){helped} by demeter learn shape --base {} --grid {} \
          --components {}; the rest from {} [{}]",
         scans.traced.len() + scans.refused.len(),
         args.credit.as_deref().unwrap_or("no credit given"),
