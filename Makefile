@@ -1,5 +1,5 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup build demo check fmt bench evaluation train
+.PHONY: setup build demo check fmt bench evaluation train species
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
 IMAGES := .cache/training/images
@@ -40,3 +40,7 @@ train: build
 	@tools/setup.sh training
 	test -d $(IMAGES) || { $(DEMETER) synth images --count 12000 --size 256 --seed 1 -o $(IMAGES).new && mv $(IMAGES).new $(IMAGES); }
 	nice -n 3 /usr/bin/python3 models/training/train_organ2d.py --data $(IMAGES) --minutes 55
+
+# Every species of recon/species from ../shared and generated plants: half an hour the first time.
+species: build
+	tools/learn-species.sh

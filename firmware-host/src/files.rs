@@ -60,7 +60,8 @@ pub fn write_mesh(path: &Path, plant: &Plant, species: &Species) -> Result<(), C
     write(path, &bytes)
 }
 
-/// The species of that name, or in the file of that name when it ends in `.safetensors`.
+/// The shipped species of that name, `generic:NAME` as it is before anything is learned, or the species in the file of
+/// that name when it ends in `.safetensors`.
 ///
 /// # Errors
 /// [`CommandError`] `species`: exit 2 for a name that is none, listing the names there are, exit 1 for a file that is
@@ -75,7 +76,11 @@ pub fn species(name: &str) -> Result<Species, CommandError> {
         return Species::from_bytes(&read(Path::new(name))?).map_err(refused);
     }
     let known = demeter_recon::species::NAMES.join(", ");
-    match demeter_recon::species::shipped(name) {
+    let found = match name.strip_prefix("generic:") {
+        Some(name) => demeter_recon::species::generic(name),
+        None => demeter_recon::species::shipped(name),
+    };
+    match found {
         Some(species) => species.map_err(|error| CommandError::failed("species", &error)),
         None => {
             let message = format!("--species: expected one of {known} or a .safetensors file, found `{name}`");

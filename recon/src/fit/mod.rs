@@ -23,7 +23,6 @@ use demeter_frame::Pose;
 pub use error::FitError;
 pub(crate) use error::{MIN_EXTENT, MIN_POINTS};
 use glam::{DQuat, DVec3};
-pub(crate) use leaf::fit as blade;
 pub use lone::{LoneBlade, lone_blade};
 pub(crate) use stem::median as median_of;
 

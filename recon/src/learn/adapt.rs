@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::deform::{Components, LearnError, Taught, both_ways, mean};
+use super::deform::{Belief, LearnError, Taught, both_ways, mean, shared_out};
 use super::displacement::Displacement;
 use super::joints::{Hanging, priors};
 use super::lesson::Lesson;
@@ -36,7 +36,6 @@ pub fn rich_in_shape(from: &Species) -> Result<Species, LearnError> {
 /// [`LearnError`] without a single blade, or when a basis cannot be had.
 pub fn adapted(lessons: &[Lesson], from: &Species) -> Result<Taught, LearnError> {
     let smooth = smooth(from)?;
-    let components = Components { leaf: from.leaf.deform.rank(), stem: from.stem.deform.rank() };
     let shapes: Vec<_> = lessons.iter().flat_map(|l| &l.shapes).map(DVector::transpose).collect();
     if shapes.is_empty() {
         return Err(LearnError::NoBlades);
@@ -51,16 +50,15 @@ pub fn adapted(lessons: &[Lesson], from: &Species) -> Result<Taught, LearnError>
 
     let leaves: Vec<&DVector<f64>> = lessons.iter().flat_map(|l| &l.leaves).collect();
     let coefficients = both_ways(&leaves, mirrored_leaf, &smooth.leaf.deform);
-    let at = mean(&coefficients).ok_or(LearnError::NoBlades)?;
-    let displacement = Displacement::of_leaf(&smooth, at).ok_or(LearnError::Still)?;
-    let leaf = bends(&coefficients, &displacement, &from.leaf.deform, components.leaf)?;
+    let blocks = Displacement::of_leaf(&smooth, mean(&coefficients).ok_or(LearnError::NoBlades)?)?;
+    let leaf = shared_out(&coefficients, &blocks, from.leaf.deform.rank(), kinship(&from.leaf.deform))?;
 
     let stems: Vec<&DVector<f64>> = lessons.iter().flat_map(|l| &l.stems).collect();
     let coefficients = both_ways(&stems, mirrored_stem, &smooth.stem.deform);
     let stem = match mean(&coefficients) {
         Some(at) => {
-            let displacement = Displacement::of_stem(&smooth, &at).ok_or(LearnError::Still)?;
-            bends(&coefficients, &displacement, &from.stem.deform, components.stem)?
+            let blocks = Displacement::of_stem(&smooth, &at)?;
+            shared_out(&coefficients, &blocks, from.stem.deform.rank(), kinship(&from.stem.deform))?
         }
         None => from.stem.deform.clone(),
     };
@@ -68,18 +66,9 @@ pub fn adapted(lessons: &[Lesson], from: &Species) -> Result<Taught, LearnError>
     Ok(Taught { shape, leaf, stem, priors: priors(&hanging, &from.priors) })
 }
 
-fn bends(
-    coefficients: &[Vec<f64>],
-    displacement: &Displacement,
-    from: &Basis,
-    components: usize,
-) -> Result<Basis, LearnError> {
-    let prior = displacement.of_basis(from)?;
-    let rows: Vec<_> = coefficients.iter().map(|c| displacement.of_coefficients(c).transpose()).collect();
-    // Every organ is there twice, as itself and in the mirror.
-    let worth = 2.0 * PRIOR_ORGANS;
-    let prior = Prior { basis: &prior, mean_samples: worth, spread_samples: worth };
-    Ok(displacement.basis_of_angles(&Pca::adapted(prior, &DMatrix::from_rows(&rows), components)?)?)
+/// The belief in a related species' bends. Every organ is there twice, as itself and in the mirror.
+fn kinship(bends: &Basis) -> impl Fn(&Displacement) -> Result<Belief, BasisError> {
+    move |block| Ok((block.of_basis(bends)?, 2.0 * PRIOR_ORGANS, 2.0 * PRIOR_ORGANS))
 }
 
 /// A shape basis with smooth modes added, as far as they are new to it.

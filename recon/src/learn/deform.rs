@@ -108,16 +108,52 @@ pub fn rich(from: &Species, lessons: &[Lesson]) -> Result<Species, LearnError> {
 pub(super) fn leaf_basis(leaves: &[&DVector<f64>], smooth: &Species, components: usize) -> Result<Basis, LearnError> {
     let coefficients = both_ways(leaves, mirrored_leaf, &smooth.leaf.deform);
     let mean = mean(&coefficients).ok_or(LearnError::NoBlades)?;
-    let displacement = Displacement::of_leaf(smooth, mean).ok_or(LearnError::Still)?;
-    components_of(&coefficients, &displacement, components)
+    shared_out(&coefficients, &Displacement::of_leaf(smooth, mean)?, components, smoothness(coefficients.len()))
 }
 
 /// The stems' basis of `components` modes.
 pub(super) fn stem_basis(stems: &[&DVector<f64>], smooth: &Species, components: usize) -> Result<Basis, LearnError> {
     let coefficients = both_ways(stems, mirrored_stem, &smooth.stem.deform);
     let mean = mean(&coefficients).unwrap_or_default();
-    let displacement = Displacement::of_stem(smooth, &mean).ok_or(LearnError::Still)?;
-    components_of(&coefficients, &displacement, components)
+    shared_out(&coefficients, &Displacement::of_stem(smooth, &mean)?, components, smoothness(coefficients.len()))
+}
+
+/// What is believed of bends before samples are seen: a basis of displacements, and the samples that its mean and its
+/// spread are worth.
+pub(super) type Belief = (Basis, f64, f64);
+
+/// The belief in smooth modes beside so many samples.
+fn smoothness(samples: usize) -> impl Fn(&Displacement) -> Result<Belief, BasisError> {
+    move |block| Ok((block.prior()?, 0.0, SMOOTH_SHARE * samples as f64))
+}
+
+/// The basis of `components` modes, shared out among the blocks by their σ, at least one each.
+pub(super) fn shared_out(
+    coefficients: &[Vec<f64>],
+    blocks: &[Displacement],
+    components: usize,
+    belief: impl Fn(&Displacement) -> Result<Belief, BasisError>,
+) -> Result<Basis, LearnError> {
+    let learn = |block: &Displacement, components: usize| {
+        let rows: Vec<_> = coefficients.iter().map(|c| block.of_coefficients(c).transpose()).collect();
+        let (basis, mean_samples, spread_samples) = belief(block)?;
+        let prior = Prior { basis: &basis, mean_samples, spread_samples };
+        Ok::<Pca, LearnError>(Pca::adapted(prior, &DMatrix::from_rows(&rows), components)?)
+    };
+    let whole = blocks.iter().map(|block| learn(block, block.rank())).collect::<Result<Vec<Pca>, _>>()?;
+    let mut sigmas: Vec<f64> = whole.iter().flat_map(|pca| pca.basis.sigma().iter().copied()).collect();
+    sigmas.sort_by(|a, b| b.total_cmp(a));
+    let least = sigmas.get(components.saturating_sub(1)).copied().unwrap_or(0.0);
+    let parts = blocks.iter().zip(&whole).map(|(block, pca)| {
+        let kept = pca.basis.sigma().iter().filter(|sigma| **sigma >= least).count().max(1);
+        Ok(block.basis_of_angles(&learn(block, kept)?)?)
+    });
+    let parts = parts.collect::<Result<Vec<Basis>, LearnError>>()?;
+    // Blocks move different angles, so their modes are orthogonal as they are.
+    let mean = parts.iter().map(Basis::mean).sum();
+    let modes: Vec<_> =
+        parts.iter().flat_map(|part| (0..part.rank()).map(|k| part.components().row(k) * part.sigma()[k])).collect();
+    Ok(Basis::from_modes(mean, &DMatrix::from_rows(&modes))?)
 }
 
 /// Coefficients of every organ and of its mirror image.
@@ -134,16 +170,4 @@ pub(super) fn mean(coefficients: &[Vec<f64>]) -> Option<Vec<f64>> {
     let first = coefficients.first()?;
     let sum = |k: usize| coefficients.iter().map(|c| c[k]).sum::<f64>();
     Some((0..first.len()).map(|k| sum(k) / coefficients.len() as f64).collect())
-}
-
-fn components_of(
-    coefficients: &[Vec<f64>],
-    displacement: &Displacement,
-    components: usize,
-) -> Result<Basis, LearnError> {
-    let rows: Vec<_> = coefficients.iter().map(|c| displacement.of_coefficients(c).transpose()).collect();
-    let samples = DMatrix::from_rows(&rows);
-    let smooth = displacement.prior()?;
-    let prior = Prior { basis: &smooth, mean_samples: 0.0, spread_samples: SMOOTH_SHARE * rows.len() as f64 };
-    Ok(displacement.basis_of_angles(&Pca::adapted(prior, &samples, components)?)?)
 }

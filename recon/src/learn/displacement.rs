@@ -5,63 +5,90 @@
 //! mean organ, less what a rotation of the whole organ takes back, y = R x with RᵀR = JᵀJ / points has the
 //! root-mean-square displacement as its length.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::deform::LearnError;
 use super::pca::Pca;
+use super::smooth::VEIN_MODES;
 use crate::model::leaf::Blade;
 use crate::model::{Basis, BasisError, Species};
 
 /// Ridge on RᵀR as a share of its mean diagonal, so that a mode that moves nothing has an inverse.
 const RIDGE: f64 = 1e-9;
 
-/// The change of coordinates between a smooth basis of angles and displacements.
+/// Variance below which a mode is rounding, as a share of the largest.
+const LEAST_VARIANCE: f64 = 1e-9;
+
+/// The change of coordinates between a block of a smooth basis of angles and displacements.
 #[derive(Clone, Debug)]
 pub(super) struct Displacement {
+    /// The smooth modes of the block.
+    block: Range<usize>,
     smooth: Basis,
     /// R, upper triangular.
     factor: DMatrix<f64>,
 }
 
 impl Displacement {
-    /// Of the species' blades, at its mean shape and at the mean of `coefficients`. Organs are of unit length.
-    pub(super) fn of_leaf(smooth: &Species, mean: Vec<f64>) -> Option<Self> {
+    /// Of the species' blades, at its mean shape and the `mean` coefficients: of the vein's bends and of the ribs'. The
+    /// two are learned apart, so that each component is found from what shows it: the course of a blade tells its vein,
+    /// and a fit that starts from there has not bent the ribs by mere correlation. Organs are of unit length.
+    pub(super) fn of_leaf(smooth: &Species, mean: Vec<f64>) -> Result<[Self; 2], LearnError> {
         let blade = Blade { beta: Vec::new(), gamma: mean, width: 1.0 };
         let jacobian = smooth.leaf.jacobian(&blade);
         let first = smooth.leaf.shape.rank();
-        Self::of(&smooth.leaf.deform, &jacobian.points, |n, k| jacobian.derivative(n, first + k))
+        let of =
+            |block| Self::of(&smooth.leaf.deform, block, &jacobian.points, |n, k| jacobian.derivative(n, first + k));
+        Ok([of(0..VEIN_MODES)?, of(VEIN_MODES..smooth.leaf.deform.rank())?])
     }
 
     /// Of the species' stems.
-    pub(super) fn of_stem(smooth: &Species, mean: &[f64]) -> Option<Self> {
+    pub(super) fn of_stem(smooth: &Species, mean: &[f64]) -> Result<[Self; 1], LearnError> {
         let jacobian = smooth.stem.jacobian(mean);
         let stride = jacobian.coefficients;
-        Self::of(&smooth.stem.deform, &jacobian.points, |n, k| jacobian.derivatives[n * stride + k])
+        let block = 0..smooth.stem.deform.rank();
+        Ok([Self::of(&smooth.stem.deform, block, &jacobian.points, |n, k| jacobian.derivatives[n * stride + k])?])
     }
 
-    fn of(smooth: &Basis, points: &[DVec3], velocity: impl Fn(usize, usize) -> DVec3) -> Option<Self> {
+    fn of(
+        smooth: &Basis,
+        block: Range<usize>,
+        points: &[DVec3],
+        velocity: impl Fn(usize, usize) -> DVec3,
+    ) -> Result<Self, LearnError> {
         let rows = 3 * points.len();
         let scale = 1.0 / (points.len() as f64).sqrt();
         let flat = |of: &dyn Fn(usize) -> DVec3| {
             DVector::from_iterator(rows, (0..points.len()).flat_map(|n| (of(n) * scale).to_array()))
         };
         let turns = DMatrix::from_columns(&DVec3::AXES.map(|axis| flat(&|n| axis.cross(points[n]))));
-        let moves = DMatrix::from_columns(
-            &(0..smooth.rank()).map(|k| flat(&|n| velocity(n, k))).collect::<Vec<DVector<f64>>>(),
-        );
+        let moves =
+            DMatrix::from_columns(&block.clone().map(|k| flat(&|n| velocity(n, k))).collect::<Vec<DVector<f64>>>());
         // What a rotation about the base takes back is no bend. A straight stem cannot roll, hence the pseudo-inverse.
-        let inverse = (turns.transpose() * &turns).pseudo_inverse(1e-9).ok()?;
+        let inverse =
+            (turns.transpose() * &turns).pseudo_inverse(1e-9).map_err(|_negative_epsilon| LearnError::Still)?;
         let moves = &moves - &turns * (inverse * (turns.transpose() * &moves));
         let mut gram = moves.transpose() * &moves;
         let ridge = RIDGE * gram.trace() / gram.nrows() as f64;
         (0..gram.nrows()).for_each(|k| gram[(k, k)] += ridge);
-        let factor: Cholesky<f64, Dyn> = gram.cholesky()?;
-        Some(Self { smooth: smooth.clone(), factor: factor.l().transpose() })
+        let factor: Cholesky<f64, Dyn> = gram.cholesky().ok_or(LearnError::Still)?;
+        let modes = smooth.components().rows(block.start, block.len()).into_owned();
+        let sigma = smooth.sigma().rows(block.start, block.len()).into_owned();
+        let smooth = Basis::new(DVector::zeros(smooth.dim()), modes, sigma)?;
+        Ok(Self { block, smooth, factor: factor.l().transpose() })
     }
 
-    /// Displacements of coefficients of the smooth basis.
+    /// Modes of the block.
+    pub(super) fn rank(&self) -> usize {
+        self.block.len()
+    }
+
+    /// Displacements of coefficients of the whole smooth basis.
     pub(super) fn of_coefficients(&self, coefficients: &[f64]) -> DVector<f64> {
-        &self.factor * DVector::from_column_slice(coefficients)
+        &self.factor * DVector::from_column_slice(&coefficients[self.block.clone()])
     }
 
     /// The smooth basis itself as a basis of displacements: its prior.
@@ -71,12 +98,13 @@ impl Displacement {
 
     /// A basis of angles as one of displacements, as far as the smooth modes span it.
     pub(super) fn of_basis(&self, angles: &Basis) -> Result<Basis, BasisError> {
-        let mean = self.of_coefficients(&self.smooth.project(angles.mean()));
+        let displacement = |angles: &DVector<f64>| &self.factor * DVector::from_vec(self.smooth.project(angles));
+        let mean = displacement(angles.mean());
         let rows: Vec<_> = (0..angles.rank())
             .map(|k| {
                 let mut one = vec![0.0; k + 1];
                 one[k] = 1.0;
-                (self.of_coefficients(&self.smooth.project(&angles.at(&one))) - &mean).transpose()
+                (displacement(&angles.at(&one)) - &mean).transpose()
             })
             .collect();
         Basis::from_modes(mean, &apart(&DMatrix::from_rows(&rows)))
@@ -103,7 +131,9 @@ impl Displacement {
 /// be so in another.
 fn apart(modes: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = (modes * modes.transpose()).symmetric_eigen();
-    let mut order: Vec<usize> = (0..modes.nrows()).collect();
+    // What a block does not hold of a basis is rounding.
+    let least = LEAST_VARIANCE * eigen.eigenvalues.max();
+    let mut order: Vec<usize> = (0..modes.nrows()).filter(|k| eigen.eigenvalues[*k] > least).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
     let rows: Vec<_> = order.iter().map(|k| upright(eigen.eigenvectors.column(*k).transpose() * modes)).collect();
     DMatrix::from_rows(&rows)
@@ -125,11 +155,11 @@ mod tests {
     #[test]
     fn displacements_are_those_of_the_points_and_bases_survive_the_change_of_metric() {
         let smooth = smooth(&generic("soybean").expect("listed").expect("valid")).expect("independent");
-        let displacement = Displacement::of_leaf(&smooth, Vec::new()).expect("blades move");
+        let [vein, ribs] = Displacement::of_leaf(&smooth, Vec::new()).expect("blades move");
         let still = smooth.leaf.grid(&Blade { beta: Vec::new(), gamma: Vec::new(), width: 1.0 }).points;
         // A fold at the vein, small enough to be linear, with the best rotation about the base taken back.
         let mut gamma = vec![0.0; smooth.leaf.deform.rank()];
-        gamma[14] = 0.001;
+        gamma[VEIN_MODES] = 0.001;
         let bent = smooth.leaf.grid(&Blade { beta: Vec::new(), gamma: gamma.clone(), width: 1.0 }).points;
         let moves: Vec<DVec3> = bent.iter().zip(&still).map(|(p, q)| *p - *q).collect();
         let (mut inertia, mut turn) = (glam::DMat3::ZERO, DVec3::ZERO);
@@ -141,14 +171,15 @@ mod tests {
         let turn = inertia.inverse() * turn;
         let left = still.iter().zip(&moves).map(|(p, moved)| (*moved - turn.cross(*p)).length_squared());
         let expected = (left.sum::<f64>() / still.len() as f64).sqrt();
-        let found = displacement.of_coefficients(&gamma).norm();
+        assert_eq!(vein.of_coefficients(&gamma).norm(), 0.0);
+        let found = ribs.of_coefficients(&gamma).norm();
         assert!((found / expected - 1.0).abs() < 0.01, "{found} against {expected}");
 
         let rows = DMatrix::from_fn(6, gamma.len(), |i, k| ((i * 7 + k * 3) % 5) as f64 - 2.0);
         let moved: Vec<_> =
-            rows.row_iter().map(|row| displacement.of_coefficients(row.transpose().as_slice()).transpose()).collect();
+            rows.row_iter().map(|row| ribs.of_coefficients(row.transpose().as_slice()).transpose()).collect();
         let pca = Pca::new(&DMatrix::from_rows(&moved), 4).expect("varies");
-        let again = displacement.of_basis(&displacement.basis_of_angles(&pca).expect("a basis")).expect("a basis");
+        let again = ribs.of_basis(&ribs.basis_of_angles(&pca).expect("a basis")).expect("a basis");
         assert!((again.mean() - pca.basis.mean()).amax() < 1e-6 * pca.basis.mean().amax().max(1.0));
         let covariance = |b: &Basis| {
             let modes = DMatrix::from_diagonal(b.sigma()) * b.components();

@@ -6,8 +6,7 @@ use nalgebra::DVector;
 use super::joints::{Hanging, hanging};
 use super::mirror::without_roll;
 use crate::cloud::diagonal;
-use crate::fit::{self, FitError};
-use crate::graph::CloudGraph;
+use crate::fit::{self, FitError, OrganFit};
 use crate::model::leaf::Blade;
 use crate::model::{Form, PlantError, Species, forward, stem};
 use crate::organs::OrganCloud;
@@ -20,7 +19,7 @@ const MIN_VISIBLE: f64 = 0.8;
 /// Diagonal to which a leaf of unknown unit is scaled: within every species' range of blades.
 const LEAF_METRES: f64 = 0.1;
 /// Fewest points of an organ that tell its bends (a guess).
-const MIN_POINTS: usize = 60;
+pub(super) const MIN_POINTS: usize = 60;
 
 /// What one cloud teaches.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,12 +42,12 @@ pub struct Refused {
     /// Its index in the fitted plant; 0 of a cloud that is one leaf.
     pub organ: usize,
     /// Why.
-    pub reason: Reason,
+    pub reason: Refusal,
 }
 
 /// Why an organ is not learned from.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Reason {
+pub enum Refusal {
     /// The fit lies too far from the points to tell the organ's bends.
     #[error("expected a fit within {expected} of the organ's length, found {found:.3}")]
     Residual {
@@ -103,9 +102,10 @@ impl Lesson {
         let mut lesson = Self { hanging: hanging(&fitted.plant), ..Self::default() };
         for (organ, (form, fit)) in fitted.plant.organs.iter().zip(&fitted.organs).enumerate() {
             // A petiole that was put in has no points and is no observation.
-            let Some(residual) = fit.residual else { continue };
-            let share = residual / posed.world_from_organ[organ].scale;
-            match refusal(fit.points, share, fit.visible_fraction) {
+            if fit.residual.is_none() {
+                continue;
+            }
+            match refusal(fit, posed.world_from_organ[organ].scale) {
                 Some(reason) => lesson.refused.push(Refused { organ, reason }),
                 None => lesson.add(&form.form, rich),
             }
@@ -117,18 +117,15 @@ impl Lesson {
     /// face.
     ///
     /// # Errors
-    /// [`LessonError::Extent`] for a cloud without extent.
+    /// [`LessonError`] for a cloud without extent or of hardly any points.
     pub fn of_leaf(points: &[DVec3], up: DVec3, rich: &Species) -> Result<Self, LessonError> {
         let size = diagonal(points).filter(|d| d.is_finite() && *d > 0.0).ok_or(LessonError::Extent)?;
         let points: Vec<DVec3> = points.iter().map(|p| (*p - points[0]) * (LEAF_METRES / size)).collect();
-        let ends = ends(&points).ok_or(LessonError::Extent)?;
-        let fits = ends.map(|base| fit::blade(&points, base, up, rich));
-        let best =
-            if fits[1].residual / fits[1].length < fits[0].residual / fits[0].length { &fits[1] } else { &fits[0] };
+        let found = fit::lone_blade(&points, None, up, rich)?;
         let mut lesson = Self::default();
-        match refusal(points.len(), best.residual / best.length, Some(best.visible)) {
+        match refusal(&found.fit, found.world_from_blade.scale) {
             Some(reason) => lesson.refused.push(Refused { organ: 0, reason }),
-            None => lesson.add_blade(&best.blade, rich),
+            None => lesson.add_blade(&found.blade, rich),
         }
         Ok(lesson)
     }
@@ -149,24 +146,14 @@ impl Lesson {
     }
 }
 
-fn refusal(points: usize, residual: f64, visible: Option<f64>) -> Option<Reason> {
-    if points < MIN_POINTS {
-        return Some(Reason::Points { expected: MIN_POINTS, found: points });
+/// Why a fit to an organ of `length` metres tells nothing.
+fn refusal(fit: &OrganFit, length: f64) -> Option<Refusal> {
+    if fit.points < MIN_POINTS {
+        return Some(Refusal::Points { expected: MIN_POINTS, found: fit.points });
     }
-    if residual > MAX_RESIDUAL {
-        return Some(Reason::Residual { expected: MAX_RESIDUAL, found: residual });
+    let residual = fit.residual.map(|metres| metres / length).filter(|share| *share > MAX_RESIDUAL);
+    if let Some(found) = residual {
+        return Some(Refusal::Residual { expected: MAX_RESIDUAL, found });
     }
-    visible.filter(|v| *v < MIN_VISIBLE).map(|found| Reason::Visible { expected: MIN_VISIBLE, found })
-}
-
-/// The two points of a cloud that are farthest apart along its surface.
-fn ends(points: &[DVec3]) -> Option<[DVec3; 2]> {
-    let graph = CloudGraph::new(points);
-    let farthest = |from: usize| {
-        let distance = graph.distances(&[from]);
-        let reached = (0..points.len()).filter(|i| distance[*i].is_finite());
-        reached.max_by(|a, b| distance[*a].total_cmp(&distance[*b]))
-    };
-    let one = farthest(farthest(0)?)?;
-    Some([points[one], points[farthest(one)?]])
+    fit.visible_fraction.filter(|v| *v < MIN_VISIBLE).map(|found| Refusal::Visible { expected: MIN_VISIBLE, found })
 }

@@ -134,7 +134,7 @@ mod tests {
         let lessons = lessons(&smooth(&from).expect("independent"), &mut seeded(4));
         let reached = reach(&lessons, &from, &[1, 8]).expect("learned");
         // Eight, because every bend has its mirror image and the smooth modes take their share.
-        assert!(reached[0].leaf > 0.01 && reached[1].leaf < 0.1 * reached[0].leaf, "{reached:?}");
+        assert!(reached[0].leaf > 0.01 && reached[1].leaf < 0.3 * reached[0].leaf, "{reached:?}");
         assert_eq!(reached[0].stem, None);
         assert!(matches!(reach(&[], &from, &[1]), Err(LearnError::NoBlades)));
     }

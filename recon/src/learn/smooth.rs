@@ -11,18 +11,22 @@ use nalgebra::{DMatrix, DVector};
 use crate::model::leaf::{ANGLES, ROWS, Side, VEIN, side_angle, vein_angle};
 use crate::model::species::SpeciesError;
 use crate::model::stem::{self, BONES};
-use crate::model::{Basis, Species};
+use crate::model::{Basis, Habit, Species};
 
 /// Waves of the main vein out of the blade; 9 half waves resolve a bend of a tenth of the blade.
 const ARCHES: usize = 10;
 /// Waves of the main vein within the blade.
 const BOWS: usize = 4;
+/// The modes of the main vein; those of the ribs follow them.
+pub(super) const VEIN_MODES: usize = ARCHES + BOWS;
 /// Waves from row to row of what the ribs do.
 const RIB_WAVES: usize = 5;
 /// Waves of a stem in each direction.
 const STEM_WAVES: usize = 12;
 /// Total turn from base to tip of one σ of the slowest wave, radians: generous, half a turn is within 3 σ.
 const ARCH: f64 = 1.0;
+/// How much more a grass's long blades turn: 3 σ are more than three quarters of a circle.
+const GRASS: f64 = 1.6;
 /// The same within the blade, which is stiff there.
 const BOW: f64 = 0.3;
 /// Total turn of one σ of a rib from the vein to the edge.
@@ -38,7 +42,7 @@ const STEM_BEND: f64 = 0.8;
 /// [`SpeciesError`] when a basis is refused, which the tests rule out.
 pub(super) fn smooth(species: &Species) -> Result<Species, SpeciesError> {
     let mut smooth = species.clone();
-    smooth.leaf.deform = Basis::from_modes(DVector::zeros(ANGLES), &DMatrix::from_rows(&leaf_modes()))?;
+    smooth.leaf.deform = Basis::from_modes(DVector::zeros(ANGLES), &DMatrix::from_rows(&leaf_modes(species.habit)))?;
     smooth.stem.deform = Basis::from_modes(DVector::zeros(stem::ANGLES), &DMatrix::from_rows(&stem_modes()))?;
     smooth.sealed()
 }
@@ -75,10 +79,11 @@ pub(super) fn shape_modes(mean: &DVector<f64>) -> Vec<Mode> {
     modes
 }
 
-fn leaf_modes() -> Vec<Mode> {
+fn leaf_modes(habit: Habit) -> Vec<Mode> {
+    let arch = if habit == Habit::Grass { GRASS * ARCH } else { ARCH };
     let mut modes = Vec::new();
     let bones = ROWS - 2;
-    for (offset, waves, turn) in [(0, ARCHES, ARCH), (1, BOWS, BOW)] {
+    for (offset, waves, turn) in [(0, ARCHES, arch), (1, BOWS, BOW)] {
         for m in 0..waves {
             let mut mode = Mode::zeros(ANGLES);
             for i in 0..bones {

@@ -1,4 +1,4 @@
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// Why a linear basis is refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -136,6 +136,21 @@ impl Basis {
         along.component_div(&self.sigma).iter().copied().collect()
     }
 
+    /// The most likely coefficients (in σ) of an output of which only some numbers are `known` (index and value), each to
+    /// a standard deviation of `sd`: those that are not say nothing, where [`Basis::project`] would have them said.
+    #[must_use]
+    pub fn likely(&self, known: &[(usize, f64)], sd: f64) -> Vec<f64> {
+        let mut h = DMatrix::identity(self.rank(), self.rank());
+        let mut g = DVector::zeros(self.rank());
+        for (n, value) in known {
+            let row = DVectorView::from_slice(self.derivative(*n), self.rank());
+            h.ger(sd.powi(-2), &row, &row, 1.0);
+            g.axpy((value - self.mean[*n]) / sd.powi(2), &row, 1.0);
+        }
+        // The identity makes it positive definite whatever is known.
+        h.cholesky().map_or_else(|| vec![0.0; self.rank()], |h| h.solve(&g).iter().copied().collect())
+    }
+
     /// Derivatives of output `n` by every coefficient.
     #[must_use]
     pub fn derivative(&self, n: usize) -> &[f64] {
@@ -165,6 +180,16 @@ impl Basis {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_known_decides_and_what_is_not_stays_likely() {
+        let modes = DMatrix::from_row_slice(2, 3, &[2.0, 1.0, 0.0, 0.0, 0.0, 3.0]);
+        let basis = Basis::from_modes(DVector::from_vec(vec![1.0, 0.0, 0.0]), &modes).expect("independent");
+        let found = basis.likely(&[(1, 1.5)], 1e-4);
+        // The first mode alone moves output 1, by 1 at one σ; the second is unknown, so 0.
+        assert!((found[0] - 1.5).abs() < 1e-6 && found[1].abs() < 1e-12, "{found:?}");
+        assert_eq!(basis.likely(&[], 1.0), [0.0, 0.0]);
+    }
 
     #[test]
     fn projection_inverts_evaluation_and_dependent_modes_are_refused() {

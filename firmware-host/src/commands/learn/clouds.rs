@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use demeter_recon::cloud::PointCloud;
-use demeter_recon::learn::Lesson;
+use demeter_recon::learn::{Lesson, blade_errors};
 use demeter_recon::model::Species;
 use demeter_recon::segment::{Labels, Up, segment};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use crate::error::{CommandError, chain};
+use crate::error::{CommandError, Exit, chain};
 use crate::files;
 
 /// What one cloud gave.
@@ -62,6 +62,21 @@ fn lesson(path: &Path, rich: &Species) -> Result<Result<Lesson, String>, Command
         let organs = segment(&cloud, rich.habit, Labels::Auto, up).map_err(|error| chain(&error))?.organs;
         Lesson::of_plant(organs, DVec3::Z, rich).map_err(|error| chain(&error))
     }))
+}
+
+/// Errors of the blades of a plant that is held out ([`blade_errors`]).
+pub(super) fn plant_errors(path: &Path, species: &Species) -> Result<Vec<f64>, CommandError> {
+    let up = Up::Axis(DVec3::Z);
+    read(&files::read(path)?)
+        .and_then(|cloud| segment(&cloud, species.habit, Labels::Auto, up).map_err(|error| chain(&error)))
+        .and_then(|found| blade_errors(&found.organs, DVec3::Z, species).map_err(|error| chain(&error)))
+        .map_err(|reason| CommandError {
+            exit: Exit::Failed,
+            kind: "cloud",
+            message: format!("{}: {reason}", path.display()),
+            expected: None,
+            found: None,
+        })
 }
 
 fn read(bytes: &[u8]) -> Result<PointCloud, String> {

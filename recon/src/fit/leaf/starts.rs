@@ -10,6 +10,9 @@ use crate::fit::stem::{clipped, mean};
 use crate::model::leaf::{Lattice, ROWS, vein_angle};
 use crate::model::{Habit, Species};
 
+/// Standard deviation of the course's turn from one of its 44 bones to the next, radians (a guess: a kink of 5 degrees
+/// every few bones).
+const COURSE_ANGLE: f64 = 0.03;
 /// The main vein alone.
 const VEIN: Lattice = Lattice::every(1, 21);
 
@@ -42,11 +45,9 @@ fn guess(path: &[DVec3], half_width: f64, across: DVec3, species: &Species) -> S
     let x = across.reject_from_normalized(along).normalize_or(along.any_orthonormal_vector());
     let rotation = DQuat::from_mat3(&DMat3::from_cols(x, along, x.cross(along)));
     let vein = angles_along(path, rotation);
-    let mut angles = species.leaf.deform.mean().clone();
-    for i in 1..ROWS {
-        angles[vein_angle(i)] = vein[2 * (i - 1)];
-        angles[vein_angle(i) + 1] = vein[2 * (i - 1) + 1];
-    }
+    // Of the blade's angles only the vein's are seen.
+    let seen: Vec<(usize, f64)> =
+        (1..ROWS).flat_map(|i| [0, 1].map(|k| (vein_angle(i) + k, vein[2 * (i - 1) + k]))).collect();
     let flat = species.leaf.flat(&[], 1.0);
     let typical = mean(flat.iter().map(|p| p.x.abs())) * metres;
     let mut state = State {
@@ -55,7 +56,7 @@ fn guess(path: &[DVec3], half_width: f64, across: DVec3, species: &Species) -> S
         log_length: metres.ln(),
         log_width: species.ranges.blade_width.clamp(half_width / typical.max(1e-9)).ln(),
         beta: vec![0.0; species.leaf.shape.rank()],
-        gamma: clipped(species.leaf.deform.project(&angles)),
+        gamma: clipped(species.leaf.deform.likely(&seen, COURSE_ANGLE)),
     };
     // The basis does not hold every bend, so the vein that is left of the course's angles is turned onto the course.
     let raw = species.leaf.points(&state.blade(), VEIN);
