@@ -1,7 +1,7 @@
 //! From a fitted plant to what is kept and told of it: its compact record, and the report of the plant that decodes
 //! from that record, never of the raw fit.
 
-use demeter_recon::fit::Fitted;
+use demeter_recon::fit::{Fitted, OrganFit};
 use demeter_recon::metrics::chamfer;
 use demeter_recon::model::{Detail, Form, Knots, Plant, PlantMesh, Species, forward};
 use demeter_recon::organs::ScaleSource;
@@ -40,7 +40,7 @@ pub fn describe(
     let plant = decode(&record, |_| Some(species)).map_err(|error| failed(&error))?.plant;
     let posed = forward(&plant, species).map_err(|error| failed(&error))?;
     let mesh = PlantMesh::of(&posed, Detail::Control, Knots::Uniform);
-    let mut report = report(&plant, species, record.len(), scale_source)?;
+    let mut report = report(&plant, species, record.len(), scale_source, &fitted.organs)?;
     report.cd = chamfer(cloud, &mesh).map(|chamfer| chamfer.cd);
     for (organ, fit) in report.organs.iter_mut().zip(&fitted.organs) {
         organ.points = Some(fit.points);
@@ -51,7 +51,7 @@ pub fn describe(
     Ok(Described { record, plant, mesh, report })
 }
 
-/// Reports on a decoded plant; its fit's residuals are not in a record.
+/// Reports on a decoded plant. What its fit knew is not in a record; `fits` is empty when it is not at hand.
 ///
 /// # Errors
 /// [`CommandError`] `record` when the plant is none.
@@ -60,9 +60,14 @@ pub fn report(
     species: &Species,
     bytes: usize,
     scale_source: ScaleSource,
+    fits: &[OrganFit],
 ) -> Result<PlantReport, CommandError> {
-    let PlantTraits { plant: whole, organs: each } =
+    let mut traits =
         PlantTraits::of(plant, species, scale_source).map_err(|error| CommandError::failed("record", &error))?;
+    if !fits.is_empty() {
+        traits.take_up(fits);
+    }
+    let PlantTraits { plant: whole, organs: each } = traits;
     let organs = plant.organs.iter().zip(each).enumerate().map(|(id, (organ, traits))| OrganReport {
         id,
         kind: organ.kind().into(),

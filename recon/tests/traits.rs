@@ -7,10 +7,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use common::{cases, random_plant, species};
 use demeter_frame::Pose;
+use demeter_recon::fit::OrganFit;
 use demeter_recon::model::leaf::{Blade, COLUMNS, ROWS, node};
 use demeter_recon::model::{Form, Joint, Organ, Plant, Species};
 use demeter_recon::organs::ScaleSource;
-use demeter_recon::traits::{PlantTraits, Traits, Unit, keys};
+use demeter_recon::traits::{PlantTraits, Sigma, Sigmas, Traits, Unit, keys};
 use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
 
@@ -172,4 +173,30 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn what_the_fit_knows_reaches_blades_and_the_plant() {
+    let species = species("soybean");
+    let organs = vec![stem(None, 0.0, 0.0, 0.5, 0.004), blade(0, 0.5, 1.0, 0.2, 0), blade(0, 1.0, 0.5, 0.3, 1)];
+    let plant = Plant { world_from_plant: Pose::IDENTITY, organs };
+    let fit = |visible_fraction: Option<f64>, sigmas: Sigmas| OrganFit {
+        source: None,
+        points: 9,
+        residual: None,
+        visible_fraction,
+        converged: true,
+        sigmas,
+    };
+    let sure = |metres: f64| Sigmas::from([(keys::LEAF_LENGTH, Sigma { data: metres, model: 0.0 })]);
+    let fits = [fit(None, Sigmas::new()), fit(Some(0.9), sure(0.003)), fit(Some(0.2), sure(0.004))];
+    let mut traits = PlantTraits::of(&plant, &species, ScaleSource::Input).unwrap();
+    assert_eq!(traits.plant.get(keys::BLADE_COUNT_VISIBLE), None);
+    traits.take_up(&fits);
+    check(&traits.plant, keys::BLADE_COUNT_VISIBLE, 1.0, Unit::One);
+    assert_eq!(traits.organs[1][keys::LEAF_LENGTH].sigma, Some(0.003));
+    let of_mean = traits.plant[keys::LEAF_LENGTH].sigma.unwrap();
+    assert!((of_mean - 0.0025).abs() < 1e-12, "{of_mean}");
+    // Nothing is known of areas here, and nothing is made up.
+    assert_eq!((traits.organs[1][keys::LEAF_AREA].sigma, traits.plant[keys::LEAF_AREA].sigma), (None, None));
 }

@@ -28,7 +28,7 @@ pub struct Args {
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let bytes = files::read(&args.record)?;
     let (record, species) = files::record(&args.record, &bytes, args.species.as_deref())?;
-    let mut report = report(&record.plant, &species, bytes.len(), record.scale_source)?;
+    let mut report = report(&record.plant, &species, bytes.len(), record.scale_source, &[])?;
     report.record = Some(args.record.display().to_string());
     if let Some(path) = &args.mesh {
         files::write_mesh(path, &record.plant, &species)?;

@@ -93,7 +93,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     if let Some(path) = &args.mesh {
         files::write_mesh(path, &plant, &species)?;
     }
-    let mut report = report(&plant, &species, bytes.len(), record.scale_source)?;
+    let mut report = report(&plant, &species, bytes.len(), record.scale_source, &[])?;
     report.record = Some(args.output.display().to_string());
     if let Some(path) = &args.picture {
         let width = |plant: &Plant| -> Result<(f64, f64), CommandError> {

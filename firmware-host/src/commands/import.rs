@@ -55,7 +55,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     }
     let before = raw.pose().map_err(|error| failed(&error))?;
     let after = forward(&projected, &species).map_err(|error| failed(&error))?;
-    let mut report = report(&projected, &species, record.len(), ScaleSource::Input)?;
+    let mut report = report(&projected, &species, record.len(), ScaleSource::Input, &[])?;
     report.record = Some(args.output.display().to_string());
     report.warnings.push(format!(
         "control points moved by {:.2} % of the plant's diagonal on average, for its angles do not all lie in the species' basis",

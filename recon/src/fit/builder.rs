@@ -9,6 +9,7 @@ use super::{FitError, OrganFit, leaf, stem};
 use crate::cloud::diagonal;
 use crate::model::kinematics::Similarity;
 use crate::model::{Form, Habit, Joint, Organ, OrganKind, PlantError, Species};
+use crate::traits::Sigmas;
 
 /// A blade of a species with petioles that starts farther than this share of its own extent from its parent gets a
 /// petiole of its own (a guess: nearer, the gap is the stem's thickness and a scan's raggedness).
@@ -130,6 +131,7 @@ impl<'a> Builder<'a> {
             residual: source.map(|_| fit.residual),
             visible_fraction: None,
             converged: fit.converged,
+            sigmas: Sigmas::new(),
         });
         self.organs.len() - 1
     }
@@ -154,6 +156,7 @@ impl<'a> Builder<'a> {
             residual: Some(fit.residual),
             visible_fraction: Some(fit.visible),
             converged: fit.converged,
+            sigmas: fit.sigmas,
         });
         self.organs.len() - 1
     }

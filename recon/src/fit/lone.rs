@@ -52,6 +52,7 @@ pub fn lone_blade(points: &[DVec3], base: Option<DVec3>, up: DVec3, species: &Sp
             residual: Some(fit.residual),
             visible_fraction: Some(fit.visible),
             converged: fit.converged,
+            sigmas: fit.sigmas,
         },
     })
 }

@@ -29,6 +29,7 @@ pub(crate) use stem::median as median_of;
 use crate::cloud::thinned;
 use crate::model::{Plant, PlantError, Similarity, Species};
 use crate::organs::OrganTree;
+use crate::traits::Sigmas;
 
 /// Most points of one organ that steer its fit: a blade of 20 cm has one every 3 mm then, and more only cost time.
 const MAX_POINTS: usize = 2_000;
@@ -46,6 +47,8 @@ pub struct OrganFit {
     pub visible_fraction: Option<f64>,
     /// The solver stopped because the cost no longer fell.
     pub converged: bool,
+    /// How sure its traits are; of stems none is known.
+    pub sigmas: Sigmas,
 }
 
 /// A fitted plant.

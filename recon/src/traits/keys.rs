@@ -14,6 +14,10 @@ pub const LEAF_COUNT: &str = "leaf_count";
 /// Plant: number of blades, each leaflet of a compound leaf counted, 1. By hand: count blades.
 pub const BLADE_COUNT: &str = "blade_count";
 
+/// Plant: number of blades of whose surface at least half has data beside it, 1; known after a fit alone, for a record
+/// does not hold what was seen. By hand: count the blades in sight.
+pub const BLADE_COUNT_VISIBLE: &str = "blade_count_visible";
+
 /// Blade: area of one side of the bent surface, m2. Plant: sum over its blades. By hand: a leaf area meter, blades
 /// without petioles.
 pub const LEAF_AREA: &str = "leaf_area";

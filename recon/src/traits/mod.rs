@@ -4,6 +4,7 @@ mod blade;
 mod branching;
 pub mod keys;
 mod shadow;
+mod uncertainty;
 
 use std::collections::BTreeMap;
 
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::{Detail, Form, Knots, Plant, PlantError, PlantMesh, Species, forward};
 use crate::organs::ScaleSource;
+pub use uncertainty::{Sigma, Sigmas, VISIBLE};
 
 /// The units of traits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

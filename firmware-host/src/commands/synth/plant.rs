@@ -47,7 +47,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     if let Some(path) = &args.mesh {
         files::write_mesh(path, &plant, &species)?;
     }
-    let mut report = report(&plant, &species, record.len(), ScaleSource::Input)?;
+    let mut report = report(&plant, &species, record.len(), ScaleSource::Input, &[])?;
     report.record = Some(args.output.display().to_string());
     if let Some(path) = &args.picture {
         files::write(path, &studio::picture(vec![(&species, plant)], [PICTURE_SIDE; 2], args.seed)?)?;

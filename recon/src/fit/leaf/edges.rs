@@ -8,31 +8,33 @@ use glam::DVec3;
 use super::equations::Pulls;
 use super::sheet::Sheet;
 use crate::fit::loss::Loss;
+use crate::fit::stem::quantile;
 
-/// Rows to either side over which the density beside a row's edge is taken.
-const NEIGHBOURS: usize = 2;
-/// Least depth of the strip in which points are counted, in standard deviations of the points: deeper, noise carries
-/// nothing across its inner line that matters.
-const DEPTH: f64 = 1.5;
+/// Least depth of the strip in which points are counted, in standard deviations of the points: at 2 noise carries less
+/// than a hundredth of itself across the strip's inner line.
+const DEPTH: f64 = 2.0;
 /// Uncertainty of an edge that is no counting error, in blade lengths: teeth and what the basis cannot follow (a guess).
 const RAGGED: f64 = 0.004;
 /// Cost at which a pull gives up, in its own variances: an edge this far from where the points end is beside a hole.
-const MOST: f64 = 9.0;
-/// Share of the blade's mean density below which a place counts as not seen.
-const SEEN: f64 = 0.25;
+const MOST: f64 = 6.0;
+/// Share of places that may lie in holes or at the brink of one: the density of those above is the blade's.
+const FULL: f64 = 0.75;
+/// Share of that density below which a place is in a hole or at its brink.
+const HOLE: f64 = 0.7;
+/// Rows or columns inwards of a strip that tell a hole from an edge.
+const GUARD: usize = 2;
+/// Rows whose strips are counted together: single ones hold too few points for their scatter to be even.
+const TOGETHER: usize = 3;
 
-/// A place to which a node of the edge should move along one direction.
-struct Goal {
-    node: usize,
-    direction: DVec3,
-    place: DVec3,
-    /// Standard deviation, metres.
-    sigma: f64,
-}
-
-/// The goals of a blade's edge, found once and then kept while the surface moves.
+/// How edges are looked for.
+#[derive(Clone, Copy)]
 pub(super) struct Edges {
-    goals: Vec<Goal>,
+    /// Standard deviation of the points about the surface, metres.
+    pub noise: f64,
+    /// Length of the blade, metres.
+    pub length: f64,
+    /// Whether the base is an edge too, or hangs on its parent.
+    pub base: bool,
 }
 
 /// Points counted on the area that nodes stand for.
@@ -52,81 +54,127 @@ impl Count {
     }
 }
 
-impl Edges {
-    /// `nearest` holds for each node how many points are nearest to it, `noise` the points' standard deviation about
-    /// the surface and `length` that of the blade, both in metres.
-    pub(super) fn find(sheet: &Sheet, nearest: &[f64], noise: f64, length: f64, base_moves: bool) -> Self {
-        let lattice = sheet.lattice;
-        let (rows, columns) = (lattice.rows(), lattice.columns());
-        let middle = columns / 2;
-        let count = |row: usize, columns: &mut dyn Iterator<Item = usize>| {
-            columns
-                .map(|j| lattice.node(row, j))
-                .fold(Count::default(), |sum, n| sum.and(Count { points: nearest[n], area: sheet.areas[n] }))
-        };
-        let all = (0..rows).fold(Count::default(), |sum, row| sum.and(count(row, &mut (0..columns))));
-        let mut goals = Vec::new();
-        let mut add = |node: usize, outwards: DVec3, width: f64, strip: Count, beside: Count| {
-            let density = beside.density();
-            if density < SEEN * all.density() {
-                return;
-            }
-            let per_metre = (density * width).max(f64::MIN_POSITIVE);
-            let shift = strip.points / per_metre - strip.area / width.max(f64::MIN_POSITIVE);
-            let counting = (strip.points + 1.0).sqrt() / per_metre;
-            let sigma = counting.hypot(RAGGED * length);
-            goals.push(Goal { node, direction: outwards, place: sheet.points[node] + outwards * shift, sigma });
-        };
-        let at = |row: usize, column: usize| sheet.points[lattice.node(row, column)];
-        // How many columns in from each side make the strip, by row.
-        let deep: Vec<usize> = (0..rows)
-            .map(|i| {
-                let step = at(i, 0).distance(at(i, columns - 1)) / (columns - 1) as f64;
-                (DEPTH * noise / step.max(f64::MIN_POSITIVE)).ceil().clamp(2.0, middle as f64) as usize
-            })
-            .collect();
-        for i in 1..rows - 1 {
-            let around = i.saturating_sub(NEIGHBOURS).max(1)..(i + NEIGHBOURS + 1).min(rows - 1);
-            let inner =
-                around.fold(Count::default(), |sum, row| sum.and(count(row, &mut (deep[row]..columns - deep[row]))));
-            let beside = if inner.area > 0.0 { inner } else { all };
-            for right in [false, true] {
-                let column = |k: usize| if right { columns - 1 - k } else { k };
-                let strip = count(i, &mut (0..deep[i]).map(column));
-                let tangent = at(i + 1, column(0)) - at(i - 1, column(0));
-                let across = at(i, column(0)) - at(i, column(1));
-                let along = tangent.normalize_or_zero();
-                let outwards = across.reject_from(tangent).normalize_or_zero();
-                if along == DVec3::ZERO || !outwards.is_finite() || outwards == DVec3::ZERO {
-                    continue;
-                }
-                add(lattice.node(i, column(0)), outwards, tangent.length() / 2.0, strip, beside);
-            }
-        }
-        // The tip, and the base where it may move: the same with whole rows.
-        for tip in [true, false] {
-            if !tip && !base_moves {
-                continue;
-            }
-            let row = |k: usize| if tip { rows - 1 - k } else { k };
-            let step = at(row(0), middle).distance(at(row(1), middle));
-            let depth = (DEPTH * noise / step.max(f64::MIN_POSITIVE)).ceil().clamp(2.0, rows as f64 / 4.0) as usize;
-            let strip = (0..depth).fold(Count::default(), |sum, k| sum.and(count(row(k), &mut (0..columns))));
-            let beside =
-                (depth..2 * depth + 2).fold(Count::default(), |sum, k| sum.and(count(row(k), &mut (0..columns))));
-            let width = at(row(depth), 0).distance(at(row(depth), columns - 1));
-            let outwards = (at(row(0), middle) - at(row(1), middle)).normalize_or_zero();
-            if outwards != DVec3::ZERO {
-                add(lattice.node(row(0), middle), outwards, width, strip, beside);
-            }
-        }
-        Self { goals }
+/// A sheet with its counts.
+struct Counted<'a> {
+    sheet: &'a Sheet,
+    counts: &'a [f64],
+}
+
+impl Counted<'_> {
+    fn node(&self, n: usize) -> Count {
+        Count { points: self.counts[n], area: self.sheet.areas[n] }
     }
 
-    pub(super) fn pull(&self, sheet: &Sheet, pulls: &mut Pulls) {
-        for goal in &self.goals {
-            let miss = (sheet.points[goal.node] - goal.place).dot(goal.direction);
-            pulls.along(goal.node, goal.direction, miss, Loss::bounded(miss, goal.sigma, MOST));
+    fn row(&self, row: usize, columns: impl Iterator<Item = usize>) -> Count {
+        columns.map(|j| self.node(self.sheet.lattice.node(row, j))).fold(Count::default(), Count::and)
+    }
+
+    fn at(&self, row: usize, column: usize) -> DVec3 {
+        self.sheet.points[self.sheet.lattice.node(row, column)]
+    }
+
+    /// Points per square metre of what `inner` nodes hold outside holes; of everything when there are none.
+    fn density(&self, inner: &[usize]) -> f64 {
+        let columns = self.sheet.lattice.columns();
+        let around = |n: usize| {
+            let block = [n - columns, n, n + columns].into_iter().flat_map(|n| [n - 1, n, n + 1]);
+            block.map(|n| self.node(n)).fold(Count::default(), Count::and).density()
+        };
+        let densities: Vec<f64> = inner.iter().map(|n| around(*n)).collect();
+        let least = HOLE * quantile(densities.clone(), FULL).unwrap_or(0.0);
+        let seen = inner.iter().zip(densities).filter(|(_, density)| *density >= least).map(|(n, _)| self.node(*n));
+        let seen = seen.fold(Count::default(), Count::and);
+        if seen.points > 0.0 {
+            return seen.density();
+        }
+        (0..self.counts.len()).map(|n| self.node(n)).fold(Count::default(), Count::and).density()
+    }
+}
+
+impl Edges {
+    /// Pulls the nodes of the sheet's edge; `counts` says how many points are nearest to each node.
+    pub(super) fn pull(&self, sheet: &Sheet, counts: &[f64], pulls: &mut Pulls) {
+        let lattice = sheet.lattice;
+        let (rows, columns) = (lattice.rows(), lattice.columns());
+        let counted = Counted { sheet, counts };
+        let wide = |i: usize| counted.at(i, 0).distance(counted.at(i, columns - 1)) / (columns - 1) as f64;
+        let deep: Vec<usize> = (0..rows).map(|i| self.deep(wide(i))).collect();
+        let long = |i: usize| counted.at(i, columns / 2).distance(counted.at(i + 1, columns / 2));
+        let (from, to) = (self.deep(long(0)), rows - self.deep(long(rows - 2)).min(rows - 1));
+        let inner =
+            (from..to).flat_map(|i| (deep[i]..columns.saturating_sub(deep[i])).map(move |j| lattice.node(i, j)));
+        let density = counted.density(&inner.collect::<Vec<_>>());
+        if density <= 0.0 {
+            return;
+        }
+        for i in 1..rows - 1 {
+            let together = i.saturating_sub(TOGETHER / 2).max(1)..(i + TOGETHER / 2 + 1).min(rows - 1);
+            for right in [false, true] {
+                let column = |k: usize| if right { columns - 1 - k } else { k };
+                let tangent = |i: usize| counted.at(i + 1, column(0)) - counted.at(i - 1, column(0));
+                let strips = together.clone().map(|i| counted.row(i, (0..deep[i].min(columns / 2)).map(column)));
+                let next = |i: usize| deep[i].min(columns / 2 - 1)..deep[i].min(columns / 2 - 1) + GUARD;
+                let beside = together.clone().map(|i| counted.row(i, next(i).map(column)));
+                let strip = Strip {
+                    node: lattice.node(i, column(0)),
+                    outwards: (counted.at(i, column(0)) - counted.at(i, column(1))).reject_from(tangent(i)),
+                    width: together.clone().map(|i| tangent(i).length() / 2.0).sum(),
+                    count: strips.fold(Count::default(), Count::and),
+                    beside: beside.fold(Count::default(), Count::and),
+                    shared: TOGETHER as f64,
+                };
+                self.pull_strip(&strip, density, pulls);
+            }
+        }
+        let ends = [(rows - 1, rows - 2, to..rows), (0, 1, 0..from)];
+        for (end, next, strip) in ends.into_iter().take(if self.base { 2 } else { 1 }) {
+            let inside = if end == 0 { strip.end } else { strip.start }.clamp(GUARD, rows - GUARD);
+            let guard = if end == 0 { inside..inside + GUARD } else { inside - GUARD..inside };
+            let strip = Strip {
+                node: lattice.node(end, columns / 2),
+                outwards: counted.at(end, columns / 2) - counted.at(next, columns / 2),
+                // An end is nearer to a triangle than to a strip, so a step of it adds half as much area.
+                width: counted.at(inside, 0).distance(counted.at(inside, columns - 1)) / 2.0,
+                count: strip.map(|i| counted.row(i, 0..columns)).fold(Count::default(), Count::and),
+                beside: guard.map(|i| counted.row(i, 0..columns)).fold(Count::default(), Count::and),
+                shared: 1.0,
+            };
+            self.pull_strip(&strip, density, pulls);
         }
     }
+
+    /// How many nodes at distances of `step` metres, half a step of which is the first one's, make up a strip.
+    fn deep(&self, step: f64) -> usize {
+        (DEPTH * self.noise / step.max(f64::MIN_POSITIVE) + 0.5).ceil().clamp(2.0, 1e3) as usize
+    }
+
+    /// Moves the strip's node by the area that is missing over the strip's width.
+    fn pull_strip(&self, strip: &Strip, density: f64, pulls: &mut Pulls) {
+        let (expected, per_metre) = (strip.count.area * density, density * strip.width);
+        let outwards = strip.outwards.normalize_or_zero();
+        // Where nothing is seen inwards of the strip either, its points do not end there: it is beside a hole.
+        if per_metre <= 0.0 || outwards == DVec3::ZERO || strip.beside.density() < HOLE * density {
+            return;
+        }
+        let miss = (expected - strip.count.points) / per_metre;
+        // By what is expected and not by what is found, or strips with few points would outweigh those with many.
+        let counting = (expected + 1.0).sqrt() / per_metre;
+        let sigma = counting.hypot(RAGGED * self.length) * strip.shared.sqrt();
+        pulls.along(strip.node, outwards, miss, Loss::bounded(miss, sigma, MOST));
+    }
+}
+
+/// A piece of the sheet along its edge.
+struct Strip {
+    /// The node that moves it.
+    node: usize,
+    /// Where it moves to.
+    outwards: DVec3,
+    /// Metres of edge.
+    width: f64,
+    count: Count,
+    /// What lies next to it inwards.
+    beside: Count,
+    /// How many strips count the same points.
+    shared: f64,
 }

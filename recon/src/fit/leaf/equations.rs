@@ -62,24 +62,44 @@ impl Pulls {
     }
 }
 
-/// Weighted residuals with their gradients, to be multiplied in one go, which is several times faster than one by one.
-struct Rows<'a> {
+/// The gradients of a state's surface, and weighted residuals that are multiplied in one go, which is several times
+/// faster than one by one.
+pub(super) struct Rows<'a> {
     state: &'a State,
-    sheet: &'a Sheet,
+    pub sheet: &'a Sheet,
     jacobian: &'a BladeJacobian,
     /// Turns a direction of the world into the chain's frame, times the chord.
     metres_from_world: DMat3,
-    parameters: usize,
+    pub parameters: usize,
     /// `[residual][parameter]`.
     gradients: Vec<f64>,
     misses: Vec<f64>,
 }
 
 impl<'a> Rows<'a> {
-    fn new(state: &'a State, sheet: &'a Sheet, jacobian: &'a BladeJacobian, base_moves: bool) -> Self {
+    pub(super) fn new(state: &'a State, sheet: &'a Sheet, jacobian: &'a BladeJacobian, base_moves: bool) -> Self {
         let parameters = State::COEFFICIENTS + jacobian.coefficients + if base_moves { 3 } else { 0 };
         let metres_from_world = DMat3::from_quat(state.rotation.inverse()) * state.metres();
         Self { state, sheet, jacobian, metres_from_world, parameters, gradients: Vec::new(), misses: Vec::new() }
+    }
+
+    /// Adds the gradient of node `n`'s place along `direction` by every parameter.
+    pub(super) fn add_gradient(&self, n: usize, direction: DVec3, to: &mut [f64]) {
+        let at = self.sheet.points[n] - self.state.base;
+        let (pose, coefficients) = to.split_at_mut(State::COEFFICIENTS);
+        let turn = at.cross(direction);
+        for (cell, by) in pose.iter_mut().zip([turn.x, turn.y, turn.z, at.dot(direction)]) {
+            *cell += by;
+        }
+        let local = self.metres_from_world * direction;
+        let (coefficients, shift) = coefficients.split_at_mut(self.jacobian.coefficients);
+        let [x, y, z] = self.jacobian.axes(n);
+        for (k, cell) in coefficients.iter_mut().enumerate() {
+            *cell += x[k] * local.x + y[k] * local.y + z[k] * local.z;
+        }
+        for (cell, by) in shift.iter_mut().zip(direction.to_array()) {
+            *cell += by;
+        }
     }
 
     fn add(&mut self, n: usize, direction: DVec3, weight: f64, weighted: f64) {
@@ -87,17 +107,11 @@ impl<'a> Rows<'a> {
             return;
         }
         let root = weight.sqrt();
-        let scaled = direction * root;
-        let at = self.sheet.points[n] - self.state.base;
-        let turn = at.cross(scaled);
-        let start = self.gradients.len();
-        self.gradients.extend([turn.x, turn.y, turn.z, at.dot(scaled)]);
-        let local = self.metres_from_world * scaled;
-        let [x, y, z] = self.jacobian.axes(n);
-        self.gradients.extend((0..x.len()).map(|k| x[k] * local.x + y[k] * local.y + z[k] * local.z));
-        if self.gradients.len() - start < self.parameters {
-            self.gradients.extend(scaled.to_array());
-        }
+        let mut row = std::mem::take(&mut self.gradients);
+        let start = row.len();
+        row.resize(start + self.parameters, 0.0);
+        self.add_gradient(n, direction * root, &mut row[start..]);
+        self.gradients = row;
         self.misses.push(weighted / root);
     }
 }

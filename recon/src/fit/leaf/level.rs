@@ -1,18 +1,22 @@
 //! The cost of a blade, linearised.
 
+use glam::DVec3;
+
 use super::data::Data;
 use super::edges::Edges;
-use super::equations::Pulls;
+use super::equations::{Pulls, Rows};
 use super::seen::Seen;
 use super::sheet::Sheet;
 use super::state::State;
+use super::uncertainty;
 use crate::fit::loss::Loss;
 use crate::fit::solver::Normal;
 use crate::model::leaf::Lattice;
 use crate::model::{Habit, Species};
+use crate::traits::Sigmas;
 
 /// Independent observations that a blade's points amount to: neighbours err together (a guess).
-const INDEPENDENT: f64 = 150.0;
+const INDEPENDENT: f64 = 80.0;
 /// A node farther from every point than this many spacings of the points has no data beside it.
 pub(super) const BESIDE: f64 = 2.0;
 
@@ -23,7 +27,7 @@ pub(super) struct Level<'a> {
     pub lattice: Lattice,
     /// Standard deviation of the points about the surface, metres.
     pub sigma: f64,
-    /// Where the edge should be; while it is not known, points beyond it pull.
+    /// How to find where the edge should be; while the blade is far, points beyond its edge pull instead.
     pub edges: Option<Edges>,
     /// The node nearest to each point when the level began.
     pub nodes: Vec<usize>,
@@ -31,6 +35,13 @@ pub(super) struct Level<'a> {
 }
 
 impl Level<'_> {
+    /// The uncertainty of the blade's traits, when `state` is where the fit ends.
+    pub(super) fn sigmas(&self, state: &State, up: DVec3) -> Sigmas {
+        let jacobian = self.species.leaf.jacobian_on(&state.blade(), self.lattice);
+        let sheet = Sheet::new(jacobian.points.iter().map(|p| state.place(*p)).collect(), self.lattice);
+        uncertainty::sigmas(self.normal(state).h, &Rows::new(state, &sheet, &jacobian, self.base_moves), up)
+    }
+
     pub(super) fn normal(&self, state: &State) -> Normal {
         let jacobian = self.species.leaf.jacobian_on(&state.blade(), self.lattice);
         let sheet = Sheet::new(jacobian.points.iter().map(|p| state.place(*p)).collect(), self.lattice);
@@ -47,13 +58,19 @@ impl Level<'_> {
                 pulls.height(*n, *height, Loss::huber(*height, self.sigma).times(share));
             }
         }
-        // Surface to data: beside data the height above them counts already, elsewhere all of the gap does.
+        // Surface to data: beside data the height above them counts already, elsewhere all of the gap does. Once the
+        // blade is near, what is far from data is a hole in them and no fault of the blade's.
         let share = INDEPENDENT / sheet.areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         for (n, gap) in seen.gaps(self.data, BESIDE * self.data.spacing) {
-            pulls.gap(n, gap, Loss::huber(gap.length(), self.sigma).times(share * sheet.areas[n]));
+            let miss = gap.length();
+            let loss = match self.edges {
+                None => Loss::huber(miss, self.sigma),
+                Some(_) => Loss::bounded(miss, BESIDE * self.data.spacing, 30.0),
+            };
+            pulls.gap(n, gap, loss.times(share * sheet.areas[n]));
         }
-        if let Some(edges) = &self.edges {
-            edges.pull(sheet, &mut pulls);
+        if let Some(edges) = self.edges {
+            edges.pull(sheet, &seen.counts, &mut pulls);
         }
         let mut normal = pulls.linearise(state, sheet, &jacobian, self.base_moves);
         let coefficients = State::COEFFICIENTS..State::COEFFICIENTS + jacobian.coefficients - 1;

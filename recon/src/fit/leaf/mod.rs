@@ -4,11 +4,13 @@
 pub(super) mod data;
 mod edges;
 mod equations;
+mod fields;
 mod level;
 mod seen;
 pub(super) mod sheet;
 mod starts;
 mod state;
+mod uncertainty;
 
 use std::cell::Cell;
 
@@ -19,6 +21,7 @@ use super::solver::minimise;
 use super::stem::{mean, median};
 use crate::model::Species;
 use crate::model::leaf::{Blade, Lattice, gauge};
+use crate::traits::Sigmas;
 use data::Data;
 use edges::Edges;
 use level::{BESIDE, Level};
@@ -34,15 +37,14 @@ const FEW_POINTS: usize = 400;
 /// Nodes that bring it near, and nodes that finish it.
 const COARSE: Lattice = Lattice::every(4, 3);
 const FINE: Lattice = Lattice::every(2, 3);
-/// Standard deviation of a blade's points about the model while it is far, as a share of its length (a guess).
-const FAR: f64 = 0.01;
 /// Least one when it is near, as a share of its length: what a basis of a few dozen modes leaves (a guess).
 const NEAR: f64 = 0.002;
-/// With few points: how many starts go on, the nearest first, and for how many steps.
-const HEATS: [(usize, usize); 3] = [(usize::MAX, 2), (2, 4), (1, 5)];
-/// Rounds with all points, each of which finds the edge anew, and their steps.
-const ROUNDS: usize = 3;
-const STEPS: usize = 3;
+/// With few points: how many starts go on, for how many steps, and the standard deviation of the points about the
+/// model meanwhile, as a share of the blade's length (a guess): the nearer, the more a misfit tells.
+const HEATS: [(usize, usize, f64); 3] = [(usize::MAX, 2, 0.01), (2, 4, 0.005), (1, 5, 0.005)];
+/// Rounds with all points, each of which measures their noise anew, and their steps.
+const ROUNDS: usize = 2;
+const STEPS: usize = 6;
 
 /// A fitted blade in the world.
 #[derive(Clone, Debug)]
@@ -59,13 +61,15 @@ pub(crate) struct LeafFit {
     /// Share of the surface with data beside it.
     pub visible: f64,
     pub converged: bool,
+    /// How sure its traits are.
+    pub sigmas: Sigmas,
 }
 
 /// Fits a blade whose base is attached at `base`; `up` tells the upper side where the cloud cannot.
 pub(crate) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -> LeafFit {
     let few = Data::thinned(points, FEW_POINTS);
     let starts = starts::along(&course(&few.points, base, SLICES), &few.points, up, species);
-    finish(points, &few, starts.to_vec(), false, species)
+    finish(points, &few, starts.map(|state| (0, state)).to_vec(), false, up, species)
 }
 
 /// Fits a blade that hangs on nothing known: its base is at either end of its course and may move.
@@ -75,21 +79,34 @@ pub(super) fn alone(points: &[DVec3], up: DVec3, species: &Species) -> LeafFit {
     let far = few.points.iter().max_by(|a, b| a.distance_squared(middle).total_cmp(&b.distance_squared(middle)));
     let one = course(&few.points, far.copied().unwrap_or(middle), SLICES);
     let other: Vec<DVec3> = one.iter().rev().copied().collect();
-    let starts = [one, other].iter().flat_map(|course| starts::along(course, &few.points, up, species)).collect();
-    finish(points, &few, starts, true, species)
+    let starts = |end, course: &[DVec3]| starts::along(course, &few.points, up, species).map(|state| (end, state));
+    finish(points, &few, [starts(0, &one), starts(1, &other)].concat(), true, up, species)
 }
 
-/// Brings the starts near with few points, each time going on with the nearest, and finishes the last one.
-fn finish(points: &[DVec3], few: &Data, mut starts: Vec<State>, base_moves: bool, species: &Species) -> LeafFit {
+/// Brings the starts, each with the end where its base is, near with few points, each time going on with the nearest of
+/// them and with each end for as long as several go on, and finishes the last one.
+fn finish(
+    points: &[DVec3],
+    few: &Data,
+    mut starts: Vec<(usize, State)>,
+    base_moves: bool,
+    up: DVec3,
+    species: &Species,
+) -> LeafFit {
     let apply = |state: &State, step: &_| state.stepped(step, species);
-    // One scale for all starts, or their costs could not be compared.
-    let sigma = FAR * starts[0].metres();
-    for (most, steps) in HEATS {
+    // One length for all starts, or their costs could not be compared.
+    let length = starts[0].1.metres();
+    for (most, steps, far) in HEATS {
+        if most > 1 && starts.len() > most {
+            let other = starts.iter().position(|(end, _)| *end != starts[0].0).unwrap_or(1);
+            starts.swap(1, other);
+        }
         starts.truncate(most);
-        let mut ranked: Vec<(f64, State)> = Vec::with_capacity(starts.len());
-        for mut state in starts {
+        let mut ranked: Vec<(f64, (usize, State))> = Vec::with_capacity(starts.len());
+        for (end, mut state) in starts {
             let nodes = Seen::of(state.sheet(species, COARSE), few, None).nodes;
-            let level = Level { data: few, species, lattice: COARSE, sigma, edges: None, nodes, base_moves };
+            let level =
+                Level { data: few, species, lattice: COARSE, sigma: far * length, edges: None, nodes, base_moves };
             // The state that is kept is the cheapest that was tried.
             let least = Cell::new(f64::INFINITY);
             let normal = |state: &State| {
@@ -98,22 +115,25 @@ fn finish(points: &[DVec3], few: &Data, mut starts: Vec<State>, base_moves: bool
                 normal
             };
             minimise(&mut state, steps, normal, apply);
-            ranked.push((least.get(), state));
+            ranked.push((least.get(), (end, state)));
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        starts = ranked.into_iter().map(|(_, state)| state).collect();
+        starts = ranked.into_iter().map(|(_, start)| start).collect();
     }
-    let mut state = starts.swap_remove(0);
+    let (_, mut state) = starts.swap_remove(0);
     let data = Data::thinned(points, MAX_POINTS);
     let mut seen = Seen::of(state.sheet(species, FINE), &data, None);
-    let mut converged = false;
-    for _ in 0..ROUNDS {
+    let (mut converged, mut sigmas) = (false, Sigmas::new());
+    for round in 1..=ROUNDS {
         let noise = 1.4826 * median(seen.heights.iter().map(|height| height.abs()).collect()).unwrap_or(0.0);
         let sigma = noise.max(NEAR * state.metres());
-        let edges = Some(Edges::find(&seen.sheet, &seen.counts, noise, state.metres(), base_moves));
+        let edges = Some(Edges { noise, length: state.metres(), base: base_moves });
         let level = Level { data: &data, species, lattice: FINE, sigma, edges, nodes: seen.nodes, base_moves };
         converged = minimise(&mut state, STEPS, |state| level.normal(state), apply);
         seen = Seen::of(state.sheet(species, FINE), &data, Some(&level.nodes));
+        if round == ROUNDS {
+            sigmas = level.sigmas(&state, up);
+        }
     }
     let areas = &seen.sheet.areas;
     let hidden: f64 = seen.gaps(&data, BESIDE * data.spacing).map(|(n, _)| areas[n]).sum();
@@ -126,5 +146,6 @@ fn finish(points: &[DVec3], few: &Data, mut starts: Vec<State>, base_moves: bool
         visible: 1.0 - hidden / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE),
         blade: state.blade(),
         converged,
+        sigmas,
     }
 }
