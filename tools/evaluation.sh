@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Writes docs/evaluation.md: every table of `demeter eval` with its goals, then tools/evaluation-notes.md, what people
-# found in the pictures and profiles. Run by `make evaluation` beside ../shared; hours on every cloud.
-#   EVERY=N    takes every N-th cloud and plant
+# found in the pictures and profiles. Run by `make evaluation` beside ../shared; half an hour on two cores.
+#   EVERY=N    takes every N-th cloud and plant, and every 20 N-th for the baselines, which take seconds each
 #   HELIOS=F   folder with tools/helios/sets.sh's sets; made with .cache/helios/bin/python where it is missing
 #   POISSON=P  a Python with what tools/poisson.py names, for the dense mesh
 set -euo pipefail
@@ -24,12 +24,21 @@ evaluation only. The program is built with the dev profile (opt-level 3), as eve
 
 ## Whole plants
 
-\`demeter eval fit --baselines\`: real scans of maize, sorghum, tobacco and tomato (organ-clouds) and one real soybean
-(27_o) without labels. SimpleProc is one procedural plant of 8 numbers; Bézier and quadratic are loose surfaces, one for
-each organ of the same division, that make no plant; screened Poisson is a dense mesh.
+\`demeter eval fit\`: real scans of maize, sorghum, tobacco and tomato (organ-clouds) and one real soybean
+(27_o) without labels.
 
 END
-    "$demeter" eval fit --every "$every" --baselines "${poisson[@]}"
+    "$demeter" eval fit --every "$every"
+    cat <<END
+
+## Beside baselines
+
+The same with \`--baselines\`, every $((20 * every)). cloud. SimpleProc is one procedural plant of 8 numbers (the authors' own
+for 27_o scores 0.059); Bézier and quadratic are loose surfaces, one for each organ of the same division, that make no
+plant; screened Poisson is a dense mesh.
+
+END
+    "$demeter" eval fit --every $((20 * every)) --baselines "${poisson[@]}"
     cat <<END
 
 ## Single blades
