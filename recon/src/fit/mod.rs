@@ -88,10 +88,11 @@ pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, F
     }
     leaflets::group(&mut builder.organs, species.habit);
     let mut plant = Plant { world_from_plant, organs: builder.organs };
-    let residuals = whole::refine(&mut plant, &builder.evidence, species)?;
+    let outcomes = whole::refine(&mut plant, &builder.evidence, species)?;
     plant.validate()?;
-    for (fit, residual) in builder.fits.iter_mut().zip(residuals) {
-        fit.residual = residual;
+    for (fit, outcome) in builder.fits.iter_mut().zip(outcomes) {
+        fit.residual = outcome.residual;
+        fit.sigmas.extend(outcome.sigmas);
         fit.points = fit.source.map_or(0, |organ| tree.organs[organ].points.len());
     }
     Ok(Fitted { plant, organs: builder.fits, dropped })

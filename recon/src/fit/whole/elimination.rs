@@ -33,6 +33,7 @@ pub(super) struct TreeEquations {
 
 /// An organ with its own parameters eliminated: given how its place moves, they are `-(shift + follow * place)`.
 struct Eliminated {
+    own: Cholesky<f64, Dyn>,
     shift: DVector<f64>,
     follow: DMatrix<f64>,
 }
@@ -59,7 +60,7 @@ impl TreeEquations {
             let across = h[i].view((0, PLACE), (PLACE, own));
             let left_h = h[i].view((0, 0), (PLACE, PLACE)) - across * &follow;
             let left_g = g[i].rows(0, PLACE) - across * &shift;
-            eliminated.push(Eliminated { shift, follow });
+            eliminated.push(Eliminated { own: factor, shift, follow });
             match block.parent {
                 Some(parent) => {
                     h[parent] += block.carry.tr_mul(&(left_h * &block.carry));
@@ -70,6 +71,29 @@ impl TreeEquations {
         }
         eliminated.reverse();
         Some(Upwards { organs: eliminated, root: root? })
+    }
+
+    /// Covariance of each organ's (place, own parameters) when the equations are in units of variance.
+    pub(super) fn covariances(&self) -> Option<Vec<DMatrix<f64>>> {
+        let Upwards { organs, root: (root, _) } = self.eliminate(0.0)?;
+        let mut all: Vec<DMatrix<f64>> = Vec::with_capacity(self.blocks.len());
+        for (block, organ) in self.blocks.iter().zip(&organs) {
+            let place = match block.parent {
+                Some(parent) => &block.carry * &all[parent] * block.carry.transpose(),
+                None => root.inverse(),
+            };
+            // Own parameters follow the place and vary about it besides.
+            let with_place = -&organ.follow * &place;
+            let own = organ.own.inverse() - &with_place * organ.follow.transpose();
+            let n = block.g.len();
+            let mut joint = DMatrix::zeros(n, n);
+            joint.view_mut((0, 0), (PLACE, PLACE)).copy_from(&place);
+            joint.view_mut((PLACE, 0), (n - PLACE, PLACE)).copy_from(&with_place);
+            joint.view_mut((0, PLACE), (PLACE, n - PLACE)).copy_from(&with_place.transpose());
+            joint.view_mut((PLACE, PLACE), (n - PLACE, n - PLACE)).copy_from(&own);
+            all.push(joint);
+        }
+        Some(all)
     }
 }
 
@@ -163,7 +187,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Elimination from the tips to the root is the solution of the same equations as one dense system.
+        /// Elimination from the tips to the root is the solution of the same equations as one dense system, and so
+        /// are its covariances.
         #[test]
         fn blocks_give_what_the_dense_system_gives(organs in 1..12_usize, seed in any::<u64>(), damping in 0.0..1.0_f64) {
             let tree = tree(organs, seed);
@@ -173,6 +198,12 @@ mod tests {
             for (step, map) in steps.iter().zip(&maps) {
                 let expected = map * &solution;
                 prop_assert!((step - &expected).amax() <= 1e-7 * (1.0 + expected.amax()), "{step} {expected}");
+            }
+            let (h, _, maps) = dense(&tree, 0.0);
+            let inverse = h.cholesky().expect("positive definite").inverse();
+            for (found, map) in tree.covariances().expect("positive definite").iter().zip(&maps) {
+                let expected = map * &inverse * map.transpose();
+                prop_assert!((found - &expected).amax() <= 1e-7 * (1.0 + expected.amax()));
             }
         }
     }

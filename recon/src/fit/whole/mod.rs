@@ -11,6 +11,7 @@ mod rigid;
 mod state;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
 
 use elimination::{Block, TreeEquations};
 use glam::{DQuat, DVec3};
@@ -24,6 +25,7 @@ use super::stem::{StemFit, mean};
 use super::tube::{Rows, Tube, TubeData};
 use crate::model::kinematics::Similarity;
 use crate::model::{Form, Plant, PlantError, Species, forward, stem};
+use crate::traits::Sigmas;
 
 /// Steps over the whole plant.
 const STEPS: usize = 6;
@@ -50,8 +52,15 @@ enum Data {
     },
 }
 
-/// Moves a plant of stage 1 onto its points, an entry of `evidence` an organ; gives the mean distance of each organ's
-/// points from its surface, metres. The cost never rises.
+/// What stage 2 says of an organ.
+pub(super) struct Outcome {
+    /// Mean distance of its points from its surface, metres; `None` without points.
+    pub residual: Option<f64>,
+    /// How sure its traits as a stem are, and its attachment; nothing without points.
+    pub sigmas: Sigmas,
+}
+
+/// Moves a plant of stage 1 onto its points, an entry of `evidence` an organ. The cost never rises.
 ///
 /// # Errors
 /// [`PlantError`] when the plant is none.
@@ -59,14 +68,25 @@ pub(super) fn refine(
     plant: &mut Plant,
     evidence: &[Evidence<'_>],
     species: &Species,
-) -> Result<Vec<Option<f64>>, PlantError> {
+) -> Result<Vec<Outcome>, PlantError> {
     let mut members = members(plant, species)?;
     let data: Vec<Data> =
         plant.organs.iter().zip(evidence).zip(&members).map(|((o, e), m)| Data::of(&o.form, *e, m, species)).collect();
-    let equations = |members: &Vec<Member>| equations(members, &data, species);
-    minimise(&mut members, STEPS, equations, |members, steps| stepped(members, steps, species));
+    let at = |members: &Vec<Member>| equations(members, &data, species);
+    minimise(&mut members, STEPS, at, |members, steps| stepped(members, steps, species));
     put_back(plant, &members, species);
-    Ok(members.iter().zip(&data).map(|(member, data)| data.residual(member, species)).collect())
+    let covariances = at(&members).covariances();
+    let outcome = |(i, (member, data)): (usize, (&Member, &Data))| {
+        let parent = member.parent.and_then(|p| match &members[p].body {
+            Body::Tube(tube) => Some(tube.metres()),
+            Body::Rigid(_) => None,
+        });
+        let residual = data.residual(member, species);
+        let covariance = covariances.as_ref().filter(|_| residual.is_some()).map(|all| &all[i]);
+        let sigmas = covariance.map(|covariance| uncertainty::sigmas(member, covariance, parent, species));
+        Outcome { residual, sigmas: sigmas.unwrap_or_default() }
+    };
+    Ok(members.iter().zip(&data).enumerate().map(outcome).collect())
 }
 
 /// The plant's organs in the world.

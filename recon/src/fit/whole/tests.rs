@@ -100,9 +100,37 @@ fn a_bridge_follows_what_hangs_on_it() {
     points[bridge].clear();
     let mut plant = disturbed(&truth);
     let before = distance(&forward(&plant, &species).expect("valid"), &forward(&truth, &species).expect("valid"));
-    let residuals = refine(&mut plant, &evidence(&points), &species).expect("valid");
+    let outcomes = refine(&mut plant, &evidence(&points), &species).expect("valid");
     let after = distance(&forward(&plant, &species).expect("valid"), &forward(&truth, &species).expect("valid"));
-    assert!(residuals[bridge].is_none() && after < 0.5 * before, "{before} {after}");
+    assert!(
+        outcomes[bridge].residual.is_none() && outcomes[bridge].sigmas.is_empty() && after < 0.5 * before,
+        "{before} {after}"
+    );
+}
+
+#[test]
+fn noisier_points_are_less_sure() {
+    use crate::traits::keys::{INTERNODE_LENGTH, STEM_DIAMETER, STEM_LENGTH};
+    let species = soybean();
+    let (truth, points) = grown(&species, 7);
+    let sigma = |points: &[Vec<DVec3>], organ: usize, key| {
+        let outcomes = refine(&mut truth.clone(), &evidence(points), &species).expect("valid");
+        outcomes[organ].sigmas[key].data
+    };
+    // Noise of 1 mm, the same number of points: it looks like none to the fit.
+    let noisy: Vec<Vec<DVec3>> = points
+        .iter()
+        .map(|organ| {
+            organ
+                .iter()
+                .map(|p| *p + 0.001 * DVec3::new((p.x * 9e5).sin(), (p.y * 9e5).sin(), (p.z * 9e5).sin()))
+                .collect()
+        })
+        .collect();
+    for (organ, key) in [(0, STEM_LENGTH), (0, STEM_DIAMETER), (1, INTERNODE_LENGTH)] {
+        let (clean, noisy) = (sigma(&points, organ, key), sigma(&noisy, organ, key));
+        assert!(clean > 0.0 && noisy > clean, "{key}: {clean} clean, {noisy} with noise");
+    }
 }
 
 proptest! {
