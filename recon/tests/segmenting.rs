@@ -32,7 +32,7 @@ fn divided(cloud: &PointCloud, species: &Species, labels: Labels, up: Up) -> Seg
 fn up_is_found_in_six_poses() {
     let (mut right, mut right_of_labels, mut all) = (0, 0, 0);
     for name in species::NAMES {
-        for (age, seed) in [(0.1, 1), (0.3, 2), (0.5, 3)] {
+        for (age, seed) in [(0.3, 2), (0.5, 3)] {
             let (species, _, made) = grown(name, age, seed);
             for up in DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
                 let side = if up.x == 0.0 { DVec3::X } else { DVec3::Y };
@@ -46,8 +46,8 @@ fn up_is_found_in_six_poses() {
         }
     }
     eprintln!("up right on {right} of {all} clouds, with labels {right_of_labels}");
-    // The youngest grasses are two straps on a stump, alike from every end.
-    assert!(right * 20 >= all * 17, "{right} of {all}");
+    // The youngest grasses, left out here, are two straps on a stump, alike from every end.
+    assert!(right * 20 >= all * 19, "{right} of {all}");
     assert_eq!(right_of_labels, all);
 }
 
