@@ -18,7 +18,7 @@ page=$(mktemp)
     cat <<END
 # Evaluation
 
-Made by \`make evaluation\` at commit $(git log -1 --format=%h$(git diff --quiet HEAD || echo +changes)), every ${every}. cloud or plant of each set; definitions are in
+Made by \`make evaluation\` at commit $(git log -1 --format=%h$(git diff --quiet HEAD || echo +changes)), step ${every} through the clouds and plants of each set; definitions are in
 spec/reconstruction.md "Metrics", goals in issue 3. Nothing was learned from or tuned on the shared clouds: they are for
 evaluation only. The program is built with the dev profile (opt-level 3), as everywhere.
 
@@ -33,7 +33,7 @@ END
 
 ## Beside baselines
 
-The same with \`--baselines\`, every $((20 * every)). cloud. SimpleProc is one procedural plant of 8 numbers (the authors' own
+The same with \`--baselines\`, step $((20 * every)). SimpleProc is one procedural plant of 8 numbers (the authors' own
 for 27_o scores 0.059); Bézier and quadratic are loose surfaces, one for each organ of the same division, that make no
 plant; screened Poisson is a dense mesh.
 
