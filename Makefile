@@ -41,6 +41,6 @@ train: build
 	test -d $(IMAGES) || { $(DEMETER) synth images --count 12000 --size 256 --seed 1 -o $(IMAGES).new && mv $(IMAGES).new $(IMAGES); }
 	nice -n 3 /usr/bin/python3 models/training/train_organ2d.py --data $(IMAGES) --minutes 55
 
-# Every species of recon/species from ../shared and generated plants: half an hour the first time.
+# Every species of recon/species from ../shared and generated plants: ten minutes, most of them growing the plants.
 species: build
 	tools/learn-species.sh

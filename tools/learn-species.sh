@@ -13,6 +13,7 @@ leaves="$data/leaf-clouds/soybean/*.txt $data/leaf-clouds/sugarbeet/*.txt"
 helios="pyhelios3d 0.1.38 (MIT, LGPL-2.1+)"
 scans="leaf scans (MIT, (c) 2020 oceam)"
 
+mkdir -p "$cache" recon/species
 python=.cache/helios/bin/python
 [ -x $python ] || {
     python3 -m venv .cache/helios
