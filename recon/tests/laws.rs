@@ -213,24 +213,6 @@ fn a_lattice_takes_its_points_from_the_whole_grid() {
     }
 }
 
-#[test]
-fn without_shape_and_angles_there_is_the_template() {
-    for name in demeter_recon::species::NAMES {
-        let species = species(name);
-        // The shipped species bend about straight organs, so γ = 0 means zero angles.
-        assert!(species.leaf.deform.mean().amax() == 0.0 && species.stem.deform.mean().amax() == 0.0);
-        let template = species.leaf.shape.mean();
-        let grid = species.leaf.grid(&blade(&species, &[], &[], 1.0)).points;
-        for (p, xy) in grid.iter().zip(template.as_slice().chunks_exact(2)) {
-            assert!(p.distance(DVec3::new(xy[0], xy[1], 0.0)) < 1e-6, "{name}: {p} and {xy:?}");
-        }
-        let stem = species.stem.curve(&[]);
-        for (i, (p, frame)) in stem.points.iter().zip(&stem.frames).enumerate() {
-            assert!(p.distance(DVec3::Y * i as f64 / BONES as f64) < 1e-12 && frame.w.abs() > 1.0 - 1e-12);
-        }
-    }
-}
-
 /// The side that photosynthesises looks up: +z of a flat blade is the front of its faces.
 #[test]
 fn the_front_of_a_flat_blade_is_its_upper_side() {
