@@ -52,8 +52,9 @@ pub fn demeter() -> std::process::Command {
 /// When the answer is no JSON or breaks the contract.
 pub fn answer(arguments: &[&str]) -> (Option<i32>, Value) {
     let output = demeter().args(arguments).arg("--json").output().expect("the program starts");
-    let answer = serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|error| panic!("{arguments:?}: {error}: {}", String::from_utf8_lossy(&output.stderr)));
+    let answer = serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
+        panic!("{arguments:?}: {error}: {}: {}", output.status, String::from_utf8_lossy(&output.stderr))
+    });
     if let Err(error) = schema().validate(&answer) {
         panic!("{arguments:?}: {error}");
     }

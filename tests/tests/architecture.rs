@@ -59,7 +59,12 @@ fn dependencies(package: &Package) -> BTreeSet<&str> {
 /// Every file of the project with one of the extensions, by its path from the root. What tools write is left out.
 fn files(extensions: &[&str]) -> BTreeMap<String, String> {
     fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
-        for entry in std::fs::read_dir(folder).unwrap() {
+        // Other programs at work in the checkout, such as Python's test runner, make folders and take them away again.
+        let entries = match std::fs::read_dir(folder) {
+            Err(gone) if gone.kind() == std::io::ErrorKind::NotFound => return,
+            entries => entries.unwrap(),
+        };
+        for entry in entries {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_str().unwrap();
             if !path.is_dir() {
@@ -72,9 +77,12 @@ fn files(extensions: &[&str]) -> BTreeMap<String, String> {
     let (root, mut found) = (demeter_tests::root(), Vec::new());
     walk(&root, &mut found);
     let wanted = |path: &PathBuf| path.extension().is_some_and(|e| extensions.iter().any(|wanted| e == *wanted));
-    let texts = found.into_iter().filter(wanted).map(|path| {
-        let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        (path.strip_prefix(&root).unwrap().to_str().unwrap().to_owned(), text)
+    let texts = found.into_iter().filter(wanted).filter_map(|path| {
+        let text = match std::fs::read_to_string(&path) {
+            Err(gone) if gone.kind() == std::io::ErrorKind::NotFound => return None,
+            text => text.unwrap_or_else(|error| panic!("{}: {error}", path.display())),
+        };
+        Some((path.strip_prefix(&root).unwrap().to_str().unwrap().to_owned(), text))
     });
     texts.collect()
 }
