@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use demeter_recon::edit::{EditError, Move, Selection, bend, between, cut, graft};
-use demeter_recon::model::Plant;
+use demeter_recon::model::{Plant, PlantError, Species, forward};
 use demeter_recon::record::SpeciesRef;
 use glam::DVec3;
 
@@ -96,19 +96,27 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let mut report = report(&plant, &species, bytes.len(), record.scale_source, &[])?;
     report.record = Some(args.output.display().to_string());
     if let Some(path) = &args.picture {
-        let width = |plant: &Plant| -> Result<(f64, f64), CommandError> {
-            let posed =
-                demeter_recon::model::forward(plant, &species).map_err(|error| CommandError::failed("edit", &error))?;
-            let x = || posed.control.iter().flatten().map(|p| p.x);
-            Ok((x().fold(f64::MAX, f64::min), x().fold(f64::MIN, f64::max)))
-        };
-        let (before, after) = (width(&record.plant)?, width(&plant)?);
-        let gap = (before.1 - before.0).max(after.1 - after.0) * GAP;
-        plant.world_from_plant.translation += DVec3::X * (before.1 - after.0 + gap);
-        files::write(path, &studio::picture(vec![(&species, record.plant), (&species, plant)], PICTURE, 1)?)?;
+        let pair = beside(record.plant, plant, &species).map_err(|error| CommandError::failed("edit", &error))?;
+        let pair = pair.into_iter().map(|plant| (&species, plant)).collect();
+        files::write(path, &studio::picture(pair, PICTURE, 1)?)?;
     }
     output.plants(&Document { plants: vec![report], ..Document::default() })?;
     Ok(Exit::Done)
+}
+
+/// Both plants on the ground, the second to the right of the first.
+fn beside(mut first: Plant, mut second: Plant, species: &Species) -> Result<[Plant; 2], PlantError> {
+    let mut reach = [(0.0, 0.0); 2];
+    for (plant, reach) in [&mut first, &mut second].into_iter().zip(&mut reach) {
+        plant.world_from_plant.translation = DVec3::ZERO;
+        let posed = forward(plant, species)?;
+        let x = || posed.control.iter().flatten().map(|p| p.x);
+        *reach = (x().fold(f64::MAX, f64::min), x().fold(f64::MIN, f64::max));
+    }
+    let [a, b] = reach;
+    let gap = (a.1 - a.0).max(b.1 - b.0) * GAP;
+    second.world_from_plant.translation.x = a.1 - b.0 + gap;
+    Ok([first, second])
 }
 
 fn bending(text: &str) -> Result<(Selection, f64), String> {

@@ -69,11 +69,11 @@ impl ReleasePlant {
             let node = name.strip_prefix("scale_").and_then(|node| node.parse().ok());
             order.extend(node.filter(|node| known(*node, LEAF.into()) || known(*node, STEM.into())));
         }
-        left_out.extend(class_of.keys().filter(|node| !order.contains(node)));
-        if order.len() > Plant::MAX_ORGANS {
-            let found = format!("{} nodes", order.len());
-            return Err(ReleaseError::Tree { node: order[0], expected: "at most 4096 nodes", found });
+        if order.len() > class_of.len() {
+            let found = format!("{} of {}", order.len(), class_of.len());
+            return Err(ReleaseError::Tree { node: order[0], expected: "each node once", found });
         }
+        left_out.extend(class_of.keys().filter(|node| !order.contains(node)));
         let depths = order.iter().map(|node| depth(*node, &parent_of)).collect::<Result<Vec<_>, _>>()?;
         let mut ranked: Vec<(usize, u32)> = depths.into_iter().zip(order).collect();
         // Stable: within a depth the file's order stays.
@@ -135,7 +135,8 @@ fn tree(node: u32, expected: &'static str, found: &str) -> ReleaseError {
     ReleaseError::Tree { node, expected, found: found.into() }
 }
 
-/// Lines `number SEPARATOR number`; empty ones are skipped, the last of equal first numbers counts.
+/// Lines `number SEPARATOR number`, for at most as many first numbers as a plant has organs; empty ones are skipped, the
+/// last of equal first numbers counts.
 fn pairs(
     file: &'static str,
     bytes: &[u8],
@@ -151,6 +152,10 @@ fn pairs(
             return Err(ReleaseError::Line { file, line: index + 1, expected, found: line.into() });
         };
         found.insert(node, value);
+        if found.len() > Plant::MAX_ORGANS {
+            let expected = "at most 4096 nodes";
+            return Err(ReleaseError::Line { file, line: index + 1, expected, found: line.into() });
+        }
     }
     Ok(found)
 }
