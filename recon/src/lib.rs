@@ -18,6 +18,7 @@ pub mod metrics;
 pub mod model;
 pub mod nearest;
 pub mod organs;
+mod polyline;
 pub mod record;
 pub mod segment;
 pub mod species;

@@ -2,10 +2,11 @@
 
 use glam::{DQuat, DVec3};
 
-use super::stem::{StemFit, distance_to_path, first, mean, nearest_on};
+use super::stem::{StemFit, first, mean};
 use crate::model::Species;
 use crate::model::kinematics::{Similarity, attachment};
 use crate::model::stem::{BONES, StemCurve};
+use crate::polyline::{distance_to_path, nearest_on};
 
 /// Share of an organ's points, nearest to its parent, that say where it starts.
 const FOOT_SHARE: f64 = 0.03;

@@ -10,6 +10,7 @@ use super::tube::{Rows, Tube, TubeData};
 use crate::cloud::thinned;
 use crate::model::Species;
 use crate::model::stem::{BONES, POINTS, gauge};
+use crate::polyline::distance_to_path;
 
 /// Slices of a stem's course: as many as control points would leave slices empty on short stems.
 const SLICES: usize = 12;
@@ -128,18 +129,6 @@ fn along(path: &[DVec3], species: &Species) -> Tube {
 /// Coefficients inside the model: |c| <= 3 σ.
 pub(super) fn clipped(c: Vec<f64>) -> Vec<f64> {
     c.into_iter().map(|c| c.clamp(-3.0, 3.0)).collect()
-}
-
-/// Distance of a point to a polyline.
-pub(super) fn distance_to_path(p: DVec3, path: &[DVec3]) -> f64 {
-    path.windows(2).map(|w| p.distance(nearest_on(p, w[0], w[1]).1)).fold(f64::INFINITY, f64::min)
-}
-
-/// The parameter in 0..=1 and place of the point of a segment nearest to `p`.
-pub(super) fn nearest_on(p: DVec3, a: DVec3, b: DVec3) -> (f64, DVec3) {
-    let along = b - a;
-    let t = ((p - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    (t, a + along * t)
 }
 
 /// Median, `None` of nothing.

@@ -9,10 +9,11 @@ use super::{Rows, Tube};
 use crate::cloud::thinned;
 use crate::fit::loss::Loss;
 use crate::fit::solver::Normal;
-use crate::fit::stem::{first, mean, median, nearest_on};
+use crate::fit::stem::{first, mean, median};
 use crate::model::Species;
 use crate::model::stem::{BONES, POINTS};
 use crate::nearest::{Nearest, Neighbour};
+use crate::polyline::nearest_on;
 
 /// Most points of one stem that steer it.
 const MAX_POINTS: usize = 400;

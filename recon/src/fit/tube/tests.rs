@@ -62,7 +62,7 @@ fn half_a_tube_tells_the_whole() {
     let half = points(&tube, &species, 0.5, 0.0);
     let middle = half.iter().copied().sum::<DVec3>() / half.len() as f64;
     let rows = Rows::of(&tube, &species);
-    assert!((stem::distance_to_path(middle, &rows.axis) - 2.0 / PI * 0.005).abs() < 0.0005);
+    assert!((crate::polyline::distance_to_path(middle, &rows.axis) - 2.0 / PI * 0.005).abs() < 0.0005);
 }
 
 #[test]
