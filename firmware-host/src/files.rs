@@ -118,7 +118,8 @@ pub fn record(path: &Path, bytes: &[u8], species: Option<&str>) -> Result<(Recor
     Ok((record::decode(bytes, |_| Some(&species)).map_err(refused)?, species))
 }
 
-/// What goes into a plant's record file, compact unless `exact`.
+/// What goes into a plant's record file, compact unless `exact`, and the plant that it holds: what is told of a record
+/// is told of that one.
 ///
 /// # Errors
 /// [`CommandError`] `record` when the plant has no record.
@@ -127,9 +128,12 @@ pub fn encode(
     species: &Species,
     scale_source: ScaleSource,
     exact: bool,
-) -> Result<Vec<u8>, CommandError> {
+) -> Result<(Vec<u8>, Plant), CommandError> {
+    let failed = |error: RecordError| CommandError::failed("record", &error);
     let encode = if exact { record::encode_exact } else { record::encode_compact };
-    encode(plant, species, scale_source).map_err(|error| CommandError::failed("record", &error))
+    let bytes = encode(plant, species, scale_source).map_err(failed)?;
+    let plant = record::decode(&bytes, |_| Some(species)).map_err(failed)?.plant;
+    Ok((bytes, plant))
 }
 
 pub(crate) fn file_error(path: &Path, error: &std::io::Error) -> CommandError {

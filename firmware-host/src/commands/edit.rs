@@ -88,7 +88,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         plant = graft(&plant, *from, *onto, *d).map_err(refused)?;
     }
     plant = cut(&plant, &args.cut).map_err(refused)?;
-    let bytes = files::encode(&plant, &species, record.scale_source, args.exact)?;
+    let (bytes, plant) = files::encode(&plant, &species, record.scale_source, args.exact)?;
     files::write(&args.output, &bytes)?;
     if let Some(path) = &args.mesh {
         files::write_mesh(path, &plant, &species)?;

@@ -47,8 +47,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let parts = read(&args.plant, PLANT_FILES)?;
     let plant = ReleasePlant::read([&parts[0], &parts[1], &parts[2]]).map_err(|error| refused(&args.plant, &error))?;
     let raw = RawPlant::of(&plant, &bases);
-    let projected = raw.project(&species);
-    let record = files::encode(&projected, &species, ScaleSource::Input, args.exact)?;
+    let (record, projected) = files::encode(&raw.project(&species), &species, ScaleSource::Input, args.exact)?;
     files::write(&args.output, &record)?;
     if let Some(path) = &args.mesh {
         files::write_mesh(path, &projected, &species)?;
