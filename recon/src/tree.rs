@@ -13,7 +13,7 @@ use crate::organs::{OrganCloud, OrganTree};
 const STRAY_SHARE: f64 = 0.01;
 /// What it costs to hang an organ by its middle, as a share of how much farther its ends are from each other than from
 /// the joint: enough to tell a blade that touches a strange petiole from one that grows there, little beside a gap
-/// (a guess, as the next two; half and twice of each changes no more than one parent in a hundred on soybeans and beans).
+/// (a guess, as the next two; half and twice of each changes up to two parents in a hundred on soybeans and beans).
 const MIDDLE_COST: f64 = 0.3;
 /// What it costs to hang a blade on a stem's side, as a share of the distance to the stem's end.
 const TIP_COST: f64 = 0.1;
