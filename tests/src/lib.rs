@@ -1,5 +1,6 @@
 //! What the end-to-end tests in `tests/tests` share: where the project stands and the contract of its JSON output.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -59,4 +60,14 @@ pub fn answer(arguments: &[&str]) -> (Option<i32>, Value) {
         panic!("{arguments:?}: {error}");
     }
     (output.status.code(), answer)
+}
+
+/// The values of traits that a record alone gives again: a fit says besides how sure it is and which blades it saw.
+///
+/// # Panics
+/// When a value is no number.
+pub fn recorded(traits: &Value) -> BTreeMap<&str, f64> {
+    let traits = traits.as_object().expect("traits are an object").iter();
+    let kept = traits.filter(|(key, _)| key.as_str() != "blade_count_visible");
+    kept.map(|(key, quantity)| (key.as_str(), quantity["value"].as_f64().expect("a number"))).collect()
 }
