@@ -20,9 +20,9 @@ pub fn generic(name: &str) -> Option<Result<Species, SpeciesError>> {
         "cowpea" => Some(trifoliate("cowpea", 0.30)),
         "maize" => Some(grass("maize", 0.042, 0.03)),
         "sorghum" => Some(grass("sorghum", 0.035, 0.02)),
-        "tobacco" => Some(broadleaf("tobacco", Habit::Simple, 0.28)),
-        "pepper" => Some(broadleaf("pepper", Habit::Simple, 0.26)),
-        "tomato" => Some(broadleaf("tomato", Habit::Compound, 0.26)),
+        "tobacco" => Some(broadleaf("tobacco", Habit::Simple, 0.28, 0.02)),
+        "pepper" => Some(broadleaf("pepper", Habit::Simple, 0.26, 0.0125)),
+        "tomato" => Some(broadleaf("tomato", Habit::Compound, 0.26, 0.0125)),
         _ => None,
     }
 }
@@ -32,11 +32,12 @@ pub fn generic(name: &str) -> Option<Result<Species, SpeciesError>> {
 fn trifoliate(name: &str, half_width: f64) -> Result<Species, SpeciesError> {
     // Soybean leaflets 3 to 15 cm, petioles to 30 cm (Lersten & Carlson, "Vegetative Morphology", Soybeans:
     // Improvement, Production, and Uses, 3rd ed. 2004); the ends are widened by a guess so that fits do not stick to
-    // them and bean and cowpea have room.
+    // them and bean and cowpea have room. No stem of the three is thicker than 15 mm (a guess; soybeans measure 5 to 12):
+    // a bundle of petioles that was not taken apart must not pass for one.
     let ranges = Ranges {
         blade_length: Range::new(0.005, 0.30),
         stem_length: Range::new(0.003, 2.0),
-        stem_radius: Range::new(0.0003, 0.02),
+        stem_radius: Range::new(0.0003, 0.0075),
         blade_width: Range::new(1.0, 1.0),
     };
     Species::new(name, Habit::Compound, ranges, PROVENANCE, &leaf(|v| ovate(half_width, v), 1.0)?, &stem()?)
@@ -58,12 +59,13 @@ fn grass(name: &str, half_width: f64, stem_radius: f64) -> Result<Species, Speci
     Species::new(name, Habit::Grass, ranges, PROVENANCE, &leaf(outline, 1.6)?, &stem()?)
 }
 
-/// A broad-leaved species with ovate blades whose half width is `half_width` blade lengths (a guess for each).
-fn broadleaf(name: &str, habit: Habit, half_width: f64) -> Result<Species, SpeciesError> {
+/// A broad-leaved species with ovate blades whose half width is `half_width` blade lengths; `stem_radius` is the thickest
+/// stem's in metres (guesses for each).
+fn broadleaf(name: &str, habit: Habit, half_width: f64, stem_radius: f64) -> Result<Species, SpeciesError> {
     let ranges = Ranges {
         blade_length: Range::new(0.003, 0.6),
         stem_length: Range::new(0.002, 2.5),
-        stem_radius: Range::new(0.0003, 0.03),
+        stem_radius: Range::new(0.0003, stem_radius),
         blade_width: Range::new(1.0, 1.0),
     };
     Species::new(name, habit, ranges, PROVENANCE, &leaf(|v| ovate(half_width, v), 1.0)?, &stem()?)
