@@ -40,7 +40,7 @@ use crate::organs::ScaleSource;
 
 /// What the encoder keeps: mean distance of corresponding vertices, in diagonals of the plant's bounding box. The
 /// goal is 0.0005; the rest is left for other meshes than the one measured.
-const VERTEX_ERROR: f64 = 0.0004;
+const VERTEX_ERROR: f64 = 0.00035;
 /// Sizes are whole numbers of 1/4096 octave.
 const SIZE_BITS: i32 = 12;
 /// Sizes and radii are kept within half of this many octaves, as a power of two: 0.5 %, below what anyone measures.
