@@ -1,11 +1,8 @@
 //! Traits of plants that are known in closed form, and laws of all others.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use common::{cases, random_plant, species};
+use crate::common::{cases, random_plant, species};
 use demeter_frame::Pose;
 use demeter_recon::fit::OrganFit;
 use demeter_recon::model::leaf::{Blade, COLUMNS, ROWS, node};

@@ -1,6 +1,5 @@
 //! No cloud makes segmentation, tree or fit panic, hang or give a number that is not finite: a typed reason or a
 //! plant inside the model (spec/reliability.md 28).
-#![allow(clippy::unwrap_used)]
 
 use demeter_recon::cloud::PointCloud;
 use demeter_recon::model::{Detail, Form, Knots, Plant, PlantMesh, Species, forward};

@@ -1,6 +1,5 @@
 //! Plants of the synthetic world, sampled, divided by their labels and fitted: what comes back is what grew.
 //! Judged on truth that the fit has not seen; figures on real scans are the command line's (`demeter fit`).
-#![allow(clippy::unwrap_used)]
 
 use demeter_recon::metrics::chamfer;
 use demeter_recon::model::{Detail, Knots, OrganKind, Plant, PlantMesh, Species, forward};

@@ -1,7 +1,5 @@
 //! Lifting on the renderer's pictures with their own truth in the place of the network's maps.
 
-#![allow(clippy::unwrap_used)]
-
 use demeter_frame::{Depth, Intrinsics, Mask, Pinhole, Pose};
 use demeter_recon::metrics::sample_surface;
 use demeter_recon::model::{Detail, Knots, OrganKind, PlantMesh, forward};

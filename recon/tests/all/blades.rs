@@ -1,8 +1,6 @@
 //! Blades fitted alone: laws that hold for any cloud, and grown blades that come back, with how sure they say they are.
 
-mod common;
-
-use common::species;
+use crate::common::species;
 use demeter_recon::fit::{FitError, LoneBlade, lone_blade};
 use demeter_recon::metrics::sample_surface;
 use demeter_recon::model::leaf::{COLUMNS, ROWS, VEIN, node};

@@ -1,5 +1,4 @@
 //! Leaflets whose petiole was not seen make one leaf when they start together, and leaves of their own when not.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
 

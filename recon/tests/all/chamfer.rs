@@ -1,9 +1,6 @@
 //! The Chamfer distance against a number that was measured apart from this program.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::shared;
+use crate::common::shared;
 use demeter_recon::cloud::PointCloud;
 use demeter_recon::metrics::chamfer;
 use demeter_recon::model::PlantMesh;

@@ -1,7 +1,4 @@
 //! Exported meshes, parsed back.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use demeter_recon::cloud::PointCloud;
 use demeter_recon::export::{mesh_to_glb, mesh_to_obj, mesh_to_ply};
@@ -11,8 +8,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 fn example() -> (PlantMesh, Vec<OrganKind>) {
-    let species = common::species("soybean");
-    let plant = common::random_plant(&species, 9, 4);
+    let species = crate::common::species("soybean");
+    let plant = crate::common::random_plant(&species, 9, 4);
     let kinds: Vec<OrganKind> = plant.organs.iter().map(Organ::kind).collect();
     assert!(kinds.contains(&OrganKind::Leaf) && kinds.contains(&OrganKind::Stem));
     (PlantMesh::of(&forward(&plant, &species).unwrap(), Detail::Coarse, Knots::Uniform), kinds)

@@ -1,9 +1,6 @@
 //! Laws of the plant model (spec/demeter-model.md "Laws to test").
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{cases, random_plant, species};
+use crate::common::{cases, random_plant, species};
 use demeter_frame::Pose;
 use demeter_recon::model::leaf::{self, Blade, COLUMNS, Lattice, ROWS, VEIN, node};
 use demeter_recon::model::stem::{self, BONES};

@@ -1,6 +1,5 @@
 //! Learning from clouds: what a grown plant's points teach are the bends it was grown with, and a basis that learned
 //! them explains plants that it has not seen.
-#![allow(clippy::unwrap_used)]
 
 use demeter_recon::learn::{Components, Lesson, LessonError, Taught, adapted, reach, rich, rich_in_shape};
 use demeter_recon::model::{Form, Priors, Species};

@@ -1,9 +1,6 @@
 //! Laws of edits.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{cases, random_plant, species};
+use crate::common::{cases, random_plant, species};
 use demeter_recon::edit::{Change, EditError, Move, Selection, What, bend, between, cut, graft};
 use demeter_recon::model::{Form, Plant, PosedPlant, forward};
 use proptest::prelude::*;

@@ -1,5 +1,4 @@
 //! Laws of learning leaf shapes: outlines, grids and the rule that rejects scans.
-#![allow(clippy::unwrap_used)]
 
 use std::f64::consts::{PI, TAU};
 

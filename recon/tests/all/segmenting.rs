@@ -1,5 +1,4 @@
 //! Clouds to organs on plants of the synthetic world, whose truth is exact.
-#![allow(clippy::unwrap_used)]
 
 use demeter_recon::cloud::{PointCloud, PointOrgan};
 use demeter_recon::export::cloud_to_ply;

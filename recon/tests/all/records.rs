@@ -1,9 +1,6 @@
 //! Laws of plant records: what comes back, how small they are, and that no bytes do harm.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{random_plant, species};
+use crate::common::{random_plant, species};
 use demeter_recon::cloud::diagonal;
 use demeter_recon::model::{Detail, Form, Knots, Organ, Plant, PlantMesh, Species, forward};
 use demeter_recon::organs::ScaleSource;
@@ -37,7 +34,7 @@ fn plants() -> impl Strategy<Value = (&'static str, usize, u64)> {
 }
 
 proptest! {
-    #![proptest_config(common::cases(24))]
+    #![proptest_config(crate::common::cases(24))]
 
     #[test]
     fn exact_records_keep_every_parameter_to_f32((name, organs, seed) in plants()) {
@@ -180,7 +177,7 @@ fn other_versions_other_species_and_other_files_are_refused_by_name() {
     assert_eq!(read(&newer), RecordError::Version { expected: 1, found: 2 });
     let unknown = decode(&bytes, |_| None::<&Species>).unwrap_err();
     assert!(matches!(unknown, RecordError::Species { .. }), "{unknown}");
-    let other = common::species("maize");
+    let other = crate::common::species("maize");
     assert!(matches!(decode(&bytes, |_| Some(&other)), Err(RecordError::Species { .. })));
 }
 

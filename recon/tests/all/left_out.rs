@@ -1,10 +1,7 @@
 //! An organ that cannot be fitted costs only itself: it is left out with its reason and what it carries hangs on its
 //! parent.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::species;
+use crate::common::species;
 use demeter_recon::fit::{self, FitError};
 use demeter_recon::model::{Habit, OrganKind, PlantError};
 use demeter_recon::organs::{OrganCloud, OrganTree};

@@ -1,9 +1,6 @@
 //! Laws of Catmull-Rom curves and of inverse kinematics.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{cases, species};
+use crate::common::{cases, species};
 use demeter_frame::Pose;
 use demeter_recon::model::leaf::{ANGLES, BladeGrid, COLUMNS, ROWS, VEIN, node};
 use demeter_recon::model::stem::{self, BONES, StemCurve};

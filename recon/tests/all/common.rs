@@ -1,5 +1,4 @@
 //! What the tests of this crate share.
-#![allow(dead_code, reason = "every test file compiles this for itself and uses a part")]
 
 use std::path::PathBuf;
 

@@ -1,9 +1,6 @@
 //! Reading and writing PLY clouds.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::shared;
+use crate::common::shared;
 use demeter_recon::cloud::{PointCloud, PointOrgan, diagonal};
 use demeter_recon::export::cloud_to_ply;
 use demeter_recon::import::{MAX_POINTS, PlyError};
@@ -99,7 +96,7 @@ impl Word {
 }
 
 proptest! {
-    #![proptest_config(common::cases(256))]
+    #![proptest_config(crate::common::cases(256))]
 
     #[test]
     fn a_cloud_written_reads_back_equal(cloud in clouds()) {
