@@ -22,6 +22,7 @@ mod polyline;
 pub mod record;
 pub mod segment;
 pub mod species;
+pub mod statistics;
 pub mod traits;
 pub mod tree;
 pub mod view;

@@ -2,6 +2,13 @@
 
 use glam::DVec3;
 
+/// Length of a line through points, 0 of fewer than two.
+pub(crate) fn path_length(points: impl IntoIterator<Item = DVec3>) -> f64 {
+    let mut points = points.into_iter();
+    let Some(mut last) = points.next() else { return 0.0 };
+    points.map(|p| std::mem::replace(&mut last, p).distance(p)).sum()
+}
+
 /// Distance of a point to a polyline, infinite when it has no segment.
 pub(crate) fn distance_to_path(p: DVec3, path: &[DVec3]) -> f64 {
     path.windows(2).map(|w| p.distance(nearest_on(p, w[0], w[1]).1)).fold(f64::INFINITY, f64::min)

@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use crate::cloud::thinned;
-use crate::fit::median_of;
 use crate::model::OrganKind;
 use crate::nearest::{Nearest, Neighbour};
 use crate::organs::{OrganCloud, OrganTree};
+use crate::statistics::median;
 
 /// Share of an organ's points that may lie nearer to another organ than their distance says: the release's first
 /// percentile, robust against strays.
@@ -126,7 +126,7 @@ impl<'a> Stem<'a> {
     fn of(shape: &'a Shape, at: Option<DVec3>) -> Self {
         let search = Nearest::of(&shape.points);
         let some = thinned(&shape.points, SPACING_SAMPLES).into_iter();
-        let spacing = median_of(some.filter_map(|p| search.k(p, 4).last().map(Neighbour::distance)).collect());
+        let spacing = median(some.filter_map(|p| search.k(p, 4).last().map(Neighbour::distance)));
         let [a, b] = shape.ends;
         let hung = |at: DVec3| if at.distance(a) < at.distance(b) { (a, b) } else { (b, a) };
         let spacing = spacing.unwrap_or(0.0).min(SPACING_SHARE * a.distance(b));
@@ -137,16 +137,14 @@ impl<'a> Stem<'a> {
     fn joint(&self, organ: &Shape, bound: f64) -> Option<Joint> {
         let ends = organ.ends;
         let least = (organ.points.len() as f64 * STRAY_SHARE) as usize;
-        let size = ends[0].distance(ends[1]);
         let cost = |p: DVec3| {
             let gap = (self.search.one(p)?.distance() - self.spacing).max(0.0);
-            let middle = MIDDLE_COST * (size - p.distance(ends[0]).max(p.distance(ends[1])));
             let place = self.ends.map_or(0.0, |(base, tip)| {
                 let foot = (FOOT_SHARE * base.distance(tip) - base.distance(p)).max(0.0);
                 let side = if organ.kind == OrganKind::Leaf { TIP_COST * tip.distance(p) } else { 0.0 };
                 foot + side
             });
-            Some((gap + middle.max(0.0) + place, p))
+            Some((gap + middle_cost(p, ends) + place, p))
         };
         // What lies farther from the stem's box than the bound needs no search.
         let reach = bound + self.spacing;
@@ -168,6 +166,12 @@ impl<'a> Stem<'a> {
 fn farthest(points: &[DVec3], from: DVec3) -> DVec3 {
     let farther = |a: DVec3, b: DVec3| if b.distance_squared(from) > a.distance_squared(from) { b } else { a };
     points.iter().copied().fold(from, farther)
+}
+
+/// What it costs to hang an organ whose ends these are by its point `p`, metres.
+pub(crate) fn middle_cost(p: DVec3, ends: [DVec3; 2]) -> f64 {
+    let [from, to] = ends.map(|end| p.distance(end));
+    MIDDLE_COST * (ends[0].distance(ends[1]) - from.max(to)).max(0.0)
 }
 
 /// About the two points of an organ that are farthest from each other.

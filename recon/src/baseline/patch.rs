@@ -4,9 +4,9 @@ use glam::{DVec2, DVec3};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use crate::axes::PrincipalAxes;
-use crate::metrics::quantile;
 use crate::model::PlantMesh;
 use crate::nearest::Nearest;
+use crate::statistics::quantile;
 
 /// Cells of a patch's mesh along its first and second axis.
 const CELLS: (usize, usize) = (32, 20);
@@ -136,7 +136,7 @@ impl Frame {
         let mut frame = Self { axes, low: DVec2::ZERO, high: DVec2::ZERO };
         let local: Vec<DVec3> = points.iter().map(|p| frame.local(*p)).collect();
         let end = |share: f64| {
-            let of = |value: fn(&DVec3) -> f64| quantile(&local.iter().map(value).collect::<Vec<_>>(), share);
+            let of = |value: fn(&DVec3) -> f64| quantile(local.iter().map(value), share);
             Some(DVec2::new(of(|p| p.x)?, of(|p| p.y)?))
         };
         (frame.low, frame.high) = (end(0.0)?, end(1.0)?);

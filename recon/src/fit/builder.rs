@@ -14,9 +14,6 @@ use crate::traits::Sigmas;
 /// A blade of a species with petioles that starts farther than this share of its own extent from its parent gets a
 /// petiole of its own (a guess: nearer, the gap is the stem's thickness and a scan's raggedness).
 const BRIDGE_SHARE: f64 = 0.08;
-/// A leaflet that starts within this share of its own extent from the end of a petiole that was put in for another
-/// hangs on that petiole too (a guess: petiolules of soybean and tomato are shorter than half their leaflet).
-const PETIOLULE_SHARE: f64 = 0.5;
 
 /// The growing plant.
 pub(super) struct Builder<'a> {
@@ -103,10 +100,11 @@ impl<'a> Builder<'a> {
         self.add_stem(Some(parent), d, joint, &bridge, None)
     }
 
-    /// The petiole put in for another leaflet of the same leaf, the one that ends nearest to `foot`.
+    /// The petiole put in for another leaflet of the same leaf, the one that ends nearest to `foot`, where a blade of
+    /// this `size` starts.
     fn shared_petiole(&self, foot: DVec3, size: f64) -> Option<usize> {
         let near = self.petioles.iter().map(|(petiole, end)| (end.distance(foot), *petiole));
-        let near = near.filter(|(away, _)| self.species.habit == Habit::Compound && *away < PETIOLULE_SHARE * size);
+        let near = near.filter(|(away, _)| self.species.habit.is_petiolule(*away, size));
         near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, petiole)| petiole)
     }
 

@@ -26,11 +26,6 @@ pub(super) fn resample(path: &[DVec3], count: usize) -> Vec<DVec3> {
         .collect()
 }
 
-/// Path length.
-pub(super) fn length(path: &[DVec3]) -> f64 {
-    path.windows(2).map(|w| w[0].distance(w[1])).sum()
-}
-
 /// The course of an elongated cloud from `start` (its point where it hangs on its parent): means of `bins` slices of
 /// equal geodesic distance, ending at the far end. At least two points come back for any cloud of at least one.
 pub(super) fn course(points: &[DVec3], start: DVec3, bins: usize) -> Vec<DVec3> {

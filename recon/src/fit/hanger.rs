@@ -2,11 +2,12 @@
 
 use glam::{DQuat, DVec3};
 
-use super::stem::{StemFit, first, mean};
+use super::stem::{StemFit, first};
 use crate::model::Species;
 use crate::model::kinematics::{Similarity, attachment};
 use crate::model::stem::{BONES, StemCurve};
 use crate::polyline::{distance_to_path, nearest_on};
+use crate::statistics::mean;
 
 /// Share of an organ's points, nearest to its parent, that say where it starts.
 const FOOT_SHARE: f64 = 0.03;
@@ -70,7 +71,7 @@ impl Hanger {
     /// the axis. Leaves that leave at a small angle start well above where their first points are nearest.
     pub(super) fn root(&self, points: &[DVec3]) -> f64 {
         let near = lowest(points, |p| distance_to_path(p, &self.path), ROOT_SHARE, MIN_ROOT, usize::MAX);
-        let (centre, away) = (middle(&near), mean(near.iter().map(|(away, _)| *away)));
+        let (centre, away) = (middle(&near), mean(near.iter().map(|(away, _)| away)).unwrap_or(0.0));
         let varies: f64 = near.iter().map(|(a, _)| (a - away).powi(2)).sum();
         let follows: DVec3 = near.iter().map(|(a, p)| (*p - centre) * (a - away)).sum();
         let slope = (follows / varies.max(f64::MIN_POSITIVE)).clamp_length_max(MAX_SLOPE);
@@ -93,7 +94,7 @@ fn lowest(points: &[DVec3], key: impl Fn(DVec3) -> f64, share: f64, least: usize
 }
 
 fn middle(points: &[(f64, DVec3)]) -> DVec3 {
-    DVec3::from_array([0, 1, 2].map(|axis| mean(points.iter().map(|(_, p)| p[axis]))))
+    DVec3::from_array([0, 1, 2].map(|axis| mean(points.iter().map(|(_, p)| p[axis])).unwrap_or(0.0)))
 }
 
 /// Rotation of a child relative to its joint, w >= 0.

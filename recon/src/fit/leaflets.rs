@@ -4,9 +4,6 @@ use std::collections::BTreeMap;
 
 use crate::model::{Form, Habit, Organ, OrganKind};
 
-/// Most leaflets that one leaf is taken to have when they hang on one petiole (soybean 3, tomato up to 9).
-const MAX_LEAFLETS: usize = 9;
-
 /// Numbers the leaves: leaflets on one petiole make one leaf.
 pub(crate) fn group(organs: &mut [Organ], habit: Habit) {
     // The stem next to the main stem that carries each organ: its petiole, or its branch.
@@ -24,7 +21,7 @@ pub(crate) fn group(organs: &mut [Organ], habit: Habit) {
             blades[*petiole] += 1;
         }
     }
-    let shared = |petiole: usize| habit == Habit::Compound && blades[petiole] <= MAX_LEAFLETS;
+    let shared = |petiole: usize| habit.shares_a_petiole(blades[petiole]);
     let mut number_of: BTreeMap<usize, u16> = BTreeMap::new();
     let mut next = 0;
     for (i, organ) in organs.iter_mut().enumerate() {

@@ -24,7 +24,6 @@ pub use error::FitError;
 pub(crate) use error::{MIN_EXTENT, MIN_POINTS};
 use glam::{DQuat, DVec3};
 pub use lone::{LoneBlade, lone_blade};
-pub(crate) use stem::median as median_of;
 
 use crate::cloud::thinned;
 use crate::model::{Plant, PlantError, Similarity, Species};

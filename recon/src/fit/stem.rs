@@ -3,14 +3,15 @@
 use glam::{DQuat, DVec3};
 use nalgebra::DVector;
 
-use super::centreline::{angles_along, course, length, resample};
+use super::centreline::{angles_along, course, resample};
 use super::loss::Loss;
 use super::solver::minimise;
 use super::tube::{Rows, Tube, TubeData};
 use crate::cloud::thinned;
 use crate::model::Species;
 use crate::model::stem::{BONES, POINTS, gauge};
-use crate::polyline::distance_to_path;
+use crate::polyline::{distance_to_path, path_length};
+use crate::statistics::{mean, quantile};
 
 /// Slices of a stem's course: as many as control points would leave slices empty on short stems.
 const SLICES: usize = 12;
@@ -49,7 +50,7 @@ pub(super) fn fit(points: &[DVec3], base: DVec3, species: &Species) -> StemFit {
     let few = thinned(points, COURSE_POINTS);
     let mut tube = along(&course(&few, base, SLICES), species);
     let axis = Rows::of(&tube, species).axis;
-    let offsets = few.iter().map(|p| distance_to_path(*p, &axis)).collect();
+    let offsets = few.iter().map(|p| distance_to_path(*p, &axis));
     let radius = quantile(offsets, RADIUS_QUANTILE).unwrap_or(0.0);
     tube.log_radius = species.ranges.stem_radius.clamp(radius).ln();
     let data = TubeData::new(points, &tube);
@@ -62,7 +63,7 @@ pub(super) fn fit(points: &[DVec3], base: DVec3, species: &Species) -> StemFit {
         (tube, converged) = (thin, thin_converged);
     }
     let misses = data.misses(&tube, species);
-    StemFit { residual: mean(misses.iter().copied()), radius_known, converged, ..StemFit::of(&tube, species) }
+    StemFit { residual: mean(&misses).unwrap_or(0.0), radius_known, converged, ..StemFit::of(&tube, species) }
 }
 
 /// Moves a tube onto its points; true when that converged.
@@ -102,7 +103,7 @@ fn along(path: &[DVec3], species: &Species) -> Tube {
     let target = resample(path, POINTS);
     let first = DQuat::from_rotation_arc(DVec3::Y, (target[1] - target[0]).normalize_or(DVec3::Z));
     let angles = DVector::from_vec(angles_along(&target, first));
-    let metres = ranges.stem_length.clamp(length(&target));
+    let metres = ranges.stem_length.clamp(path_length(target.iter().copied()));
     let mut tube = Tube {
         base: target[0],
         rotation: first,
@@ -131,27 +132,10 @@ pub(super) fn clipped(c: Vec<f64>) -> Vec<f64> {
     c.into_iter().map(|c| c.clamp(-3.0, 3.0)).collect()
 }
 
-/// Median, `None` of nothing.
-pub(crate) fn median(x: Vec<f64>) -> Option<f64> {
-    quantile(x, 0.5)
-}
-
-/// The value that this share of the others lies below, `None` of nothing.
-pub(super) fn quantile(mut x: Vec<f64>, share: f64) -> Option<f64> {
-    x.sort_by(f64::total_cmp);
-    x.get((x.len() as f64 * share) as usize).copied()
-}
-
-/// Mean, 0 of nothing.
-pub(super) fn mean(x: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let n = x.len().max(1);
-    x.sum::<f64>() / n as f64
-}
-
 /// Where points begin, from how far along each is: of even points, the first is as far before the share `near` of them
 /// as that is before the share `far`. Resists strays and noise as the least of them does not.
 pub(super) fn first(along: Vec<f64>, [near, far]: [f64; 2]) -> f64 {
     let least = along.iter().copied().fold(f64::INFINITY, f64::min);
-    let [near, far] = [near, far].map(|share| quantile(along.clone(), share).unwrap_or(0.0));
+    let [near, far] = [near, far].map(|share| quantile(&along, share).unwrap_or(0.0));
     (2.0 * near - far).max(least)
 }

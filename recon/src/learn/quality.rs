@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::contour::{area, distance};
 use super::outline::{Outline, Traced};
+use crate::statistics::{deviation, median};
 
 /// A scan that is too unlike the others to be a leaf's true outline: bites, tears, masks drawn across missing parts.
 ///
@@ -71,8 +72,6 @@ const OUTLIER_SIGMAS: f64 = 3.5;
 const LEAST_SCANS: usize = 12;
 /// Points of each side over which raggedness averages, of 200.
 const AVERAGED: usize = 11;
-/// Standard deviations in one median absolute deviation of a normal distribution.
-const SIGMA_OF_MAD: f64 = 1.4826;
 
 impl Measure {
     const ALL: [Self; 4] = [Self::Bay, Self::Raggedness, Self::Lopsidedness, Self::Width];
@@ -120,8 +119,8 @@ pub fn rejections(scans: &[Traced]) -> Vec<Option<Rejection>> {
         if passed.len() < LEAST_SCANS {
             continue;
         }
-        let median = middle(passed.clone());
-        let limit = OUTLIER_SIGMAS * SIGMA_OF_MAD * middle(passed.iter().map(|x| (x - median).abs()).collect());
+        let median = median(&passed).unwrap_or(0.0);
+        let limit = OUTLIER_SIGMAS * deviation(passed.iter().map(|x| x - median));
         for (reason, found) in reasons.iter_mut().zip(values) {
             let off = if measure.one_sided() { found - median } else { (found - median).abs() };
             if off > limit {
@@ -147,12 +146,6 @@ fn alone(scan: &Traced) -> Option<Rejection> {
     } else {
         None
     }
-}
-
-/// The median; 0 of nothing.
-fn middle(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The convex hull of points, counter-clockwise (Andrew's monotone chain).

@@ -10,6 +10,7 @@ use super::smooth::smooth;
 use crate::fit::solver::{Normal, minimise};
 use crate::model::leaf::Blade;
 use crate::model::{Basis, Species};
+use crate::statistics::mean;
 
 /// Folds of the clouds: organs of one plant are alike and must be left out together.
 const FOLDS: usize = 5;
@@ -47,7 +48,6 @@ pub fn reach(lessons: &[Lesson], from: &Species, components: &[usize]) -> Result
                 stem.extend(held.iter().flat_map(|i| &teaching[*i].stems).map(|a| stem_error(a, &basis, &smooth)));
             }
         }
-        let mean = |x: &[f64]| (!x.is_empty()).then(|| x.iter().sum::<f64>() / x.len() as f64);
         reached.push(Reach { components: *k, leaf: mean(&leaf).ok_or(LearnError::NoBlades)?, stem: mean(&stem) });
     }
     Ok(reached)

@@ -1,5 +1,7 @@
 //! Measured values beside their truth: bias, RMSE, MAPE, R² and the coverage of intervals.
 
+use crate::statistics::mean;
+
 /// Half the width of a 95 % interval in standard uncertainties of a normal distribution.
 const HALF_WIDTH_95: f64 = 1.959_964;
 
@@ -53,21 +55,6 @@ impl Agreement {
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0_usize), |(sum, count), value| (sum + value, count + 1));
-    (count > 0).then(|| sum / count as f64)
-}
-
-/// The `share` quantile (0..=1) of values in any order, linear between neighbours; `None` without values.
-#[must_use]
-pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = share.clamp(0.0, 1.0) * (sorted.len().checked_sub(1)?) as f64;
-    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
-    Some(low + (high - low) * at.fract())
-}
-
 #[cfg(test)]
 mod tests {
     use approx::assert_relative_eq;
@@ -110,20 +97,5 @@ mod tests {
             prop_assert!((one.mape.unwrap() - other.mape.unwrap()).abs() < 1e-9);
             prop_assert!(one.rmse >= one.bias.abs() - 1e-12);
         }
-
-        #[test]
-        fn quantiles_grow_with_their_share(
-            values in prop::collection::vec(-5.0..5.0_f64, 1..50), a in 0.0..1.0_f64, b in 0.0..1.0_f64,
-        ) {
-            let (low, high) = (quantile(&values, a.min(b)).unwrap(), quantile(&values, a.max(b)).unwrap());
-            prop_assert!(low <= high);
-            prop_assert_eq!(quantile(&values, 0.0).unwrap(), values.iter().copied().fold(f64::INFINITY, f64::min));
-        }
-    }
-
-    #[test]
-    fn the_middle_of_an_even_number_is_between() {
-        assert_eq!(quantile(&[4.0, 1.0, 3.0, 2.0], 0.5), Some(2.5));
-        assert_eq!(quantile(&[], 0.5), None);
     }
 }

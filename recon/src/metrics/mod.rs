@@ -4,6 +4,6 @@ mod agreement;
 mod chamfer;
 mod parents;
 
-pub use agreement::{Agreement, Pair, quantile};
+pub use agreement::{Agreement, Pair};
 pub use chamfer::{Chamfer, SURFACE_SAMPLES, chamfer, rough_chamfer, sample_surface};
 pub use parents::{Parents, right_parents};

@@ -67,6 +67,24 @@ pub enum Habit {
     Compound,
 }
 
+/// Most leaflets of one leaf (soybean and bean 3, tomato up to 9).
+const MAX_LEAFLETS: usize = 9;
+/// Longest petiolule as a share of its leaflet (a guess: soybean's, bean's and tomato's are shorter, and the petioles
+/// of neighbouring leaves are not).
+const PETIOLULE_SHARE: f64 = 0.5;
+
+impl Habit {
+    /// Whether so many blades on one petiole may be one leaf's.
+    pub(crate) fn shares_a_petiole(self, blades: usize) -> bool {
+        self == Self::Compound && blades <= MAX_LEAFLETS
+    }
+
+    /// Whether a stalk may be a petiolule of a blade; lengths in one unit.
+    pub(crate) fn is_petiolule(self, stalk: f64, blade: f64) -> bool {
+        self == Self::Compound && stalk < PETIOLULE_SHARE * blade
+    }
+}
+
 /// A species of the Demeter model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Species {

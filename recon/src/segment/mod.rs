@@ -13,10 +13,11 @@ mod up;
 use glam::DVec3;
 
 use crate::cloud::{PointCloud, diagonal};
-use crate::fit::{self, median_of};
+use crate::fit;
 use crate::model::{Habit, OrganKind};
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
+use crate::statistics::median;
 pub use up::Up;
 
 /// Where organ labels come from.
@@ -126,8 +127,8 @@ fn organ(points: &[DVec3], kind: OrganKind, mut members: Vec<usize>) -> OrganClo
 /// Distance to the `k`-th neighbour, its median over a sample, metres: the cloud's grain.
 fn grain(points: &[DVec3], search: &Nearest, k: usize) -> f64 {
     let stride = points.len().div_ceil(2_000).max(1);
-    let gaps = points.iter().step_by(stride).filter_map(|p| search.k(*p, k + 1).last().map(|n| n.distance())).collect();
-    median_of(gaps).unwrap_or(0.0).max(1e-6)
+    let gaps = points.iter().step_by(stride).filter_map(|p| search.k(*p, k + 1).last().map(|n| n.distance()));
+    median(gaps).unwrap_or(0.0).max(1e-6)
 }
 
 /// Index of the point nearest to a place.

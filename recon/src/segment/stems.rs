@@ -8,6 +8,7 @@ use crate::graph::{CloudGraph, Skeleton};
 use crate::model::{Habit, OrganKind};
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
+use crate::tree::middle_cost;
 
 /// Points of all stems together that the skeleton is drawn from: more than a scan's stems have, few enough to be quick.
 const SEEN: usize = 6_000;
@@ -21,15 +22,8 @@ const LEAST: f64 = 4.0;
 const BARE: f64 = 3.0;
 /// Levels over which directions are compared at a fork.
 const AHEAD: usize = 6;
-/// Leaflets whose petiolules are shorter than this share of their length make one leaf (a guess: soybean's and bean's
-/// are, and the petioles of neighbouring leaves are not).
-const PETIOLULE_SHARE: f64 = 0.5;
-/// Most leaflets of a leaf (soybean and bean 3, tomato up to 9).
-const MAX_LEAFLETS: usize = 9;
 /// Cosine of the largest turn of a stem that goes on beyond its last fork (20°): petioles leave more sharply.
 const STRAIGHT: f64 = 0.94;
-/// As in the tree: what it costs a blade to hang by its middle, as a share of the way to its end.
-const MIDDLE_COST: f64 = 0.3;
 
 /// Divides the stem points `members`; `blades` say what hangs on them. The main stem comes first.
 pub(super) fn split(
@@ -71,14 +65,13 @@ pub(super) fn split(
 
 /// The stem point at which a blade hangs, and the blade's length.
 fn joint(blade: &[DVec3], stems: &Nearest) -> Option<(usize, f64)> {
-    let [a, b] = crate::tree::ends(blade);
-    let size = a.distance(b);
+    let ends = crate::tree::ends(blade);
     let cost = |p: &DVec3| {
         let found = stems.one(*p)?;
-        Some((found.distance() + MIDDLE_COST * (size - p.distance(a).max(p.distance(b))), found.index))
+        Some((found.distance() + middle_cost(*p, ends), found.index))
     };
     let best = blade.iter().filter_map(cost).min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(_, at)| (at, size))
+    best.map(|(_, at)| (at, ends[0].distance(ends[1])))
 }
 
 /// A skeleton's nodes given to organs.
@@ -138,8 +131,7 @@ impl Division {
             length[*node] = length[*node].max(*size);
         }
         for k in (0..n).rev() {
-            let leaflets = habit == Habit::Compound && (2..=MAX_LEAFLETS).contains(&blades[k]);
-            if leaflets && way[k] < PETIOLULE_SHARE * length[k] {
+            if blades[k] > 1 && habit.shares_a_petiole(blades[k]) && habit.is_petiolule(way[k], length[k]) {
                 self.leaves[k] = 1;
             }
             let Some(p) = self.skeleton.parent[k] else { continue };

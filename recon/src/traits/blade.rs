@@ -4,10 +4,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use super::{Traits, Unit, keys, length, put};
+use super::{Traits, Unit, keys, put};
 use crate::model::PlantMesh;
 use crate::model::leaf::{COLUMNS, ROWS, VEIN, node};
-use crate::polyline::distance_to_path;
+use crate::polyline::{distance_to_path, path_length};
 
 /// Rows of the main vein whose chord is the direction in which a blade leaves its stem: a quarter.
 const FIRST_QUARTER: usize = (ROWS - 1) / 4;
@@ -38,8 +38,8 @@ pub(super) struct Carrier<'a> {
 /// Measures a blade from its control points in the world, its area and normal, and the stem that carries it.
 pub(super) fn measure(traits: &mut Traits, control: &[DVec3], (area, normal): (f64, DVec3), stem: &Carrier<'_>) {
     let vein: Vec<DVec3> = (0..ROWS).map(|i| control[node(i, VEIN)]).collect();
-    let along = length(vein.iter().copied()) - inside(&vein, stem);
-    let rows = (1..ROWS - 1).map(|i| length(control[node(i, 0)..node(i, COLUMNS)].iter().copied()));
+    let along = path_length(vein.iter().copied()) - inside(&vein, stem);
+    let rows = (1..ROWS - 1).map(|i| path_length(control[node(i, 0)..node(i, COLUMNS)].iter().copied()));
     put(traits, keys::LEAF_AREA, area, Unit::SquareMetre);
     put(traits, keys::LEAF_LENGTH, along, Unit::Metre);
     put(traits, keys::LEAF_WIDTH, rows.fold(0.0, f64::max), Unit::Metre);
@@ -70,5 +70,5 @@ fn inside(vein: &[DVec3], stem: &Carrier<'_>) -> f64 {
     let Some(out) = away.iter().position(|away| *away > stem.radius) else { return 0.0 };
     let Some(last) = out.checked_sub(1) else { return 0.0 };
     let share = (stem.radius - away[last]) / (away[out] - away[last]);
-    length(vein[..out].iter().copied()) + share * vein[last].distance(vein[out])
+    path_length(vein[..out].iter().copied()) + share * vein[last].distance(vein[out])
 }

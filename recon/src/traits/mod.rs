@@ -8,11 +8,11 @@ mod uncertainty;
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::model::{Detail, Form, Knots, Plant, PlantError, PlantMesh, Species, forward};
 use crate::organs::ScaleSource;
+use crate::statistics::mean;
 pub use uncertainty::{Sigma, Sigmas, VISIBLE};
 
 /// The units of traits.
@@ -126,7 +126,7 @@ fn summary(plant: &Plant, organs: &[Traits]) -> Traits {
     let area: f64 = areas.iter().sum();
     put(&mut whole, keys::LEAF_AREA, area, Unit::SquareMetre);
     for key in [keys::LEAF_LENGTH, keys::LEAF_WIDTH] {
-        if let Some(mean) = mean(&values(key)) {
+        if let Some(mean) = mean(values(key)) {
             put(&mut whole, key, mean, Unit::Metre);
         }
     }
@@ -147,7 +147,7 @@ fn summary(plant: &Plant, organs: &[Traits]) -> Traits {
         .collect();
     on_main.sort_by(|a, b| a.0.total_cmp(&b.0));
     on_main.dedup_by(|b, a| branching::share_a_node(a.0, b.0));
-    if let Some(mean) = mean(&on_main.iter().map(|node| node.1).collect::<Vec<f64>>()) {
+    if let Some(mean) = mean(on_main.iter().map(|node| node.1)) {
         put(&mut whole, keys::INTERNODE_LENGTH, mean, Unit::Metre);
     }
     whole
@@ -155,15 +155,4 @@ fn summary(plant: &Plant, organs: &[Traits]) -> Traits {
 
 fn put(traits: &mut Traits, key: &str, value: f64, unit: Unit) {
     traits.insert(key.to_owned(), Quantity { value, unit, sigma: None });
-}
-
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-/// Length of a line through points.
-fn length(points: impl IntoIterator<Item = DVec3>) -> f64 {
-    let mut points = points.into_iter();
-    let Some(mut last) = points.next() else { return 0.0 };
-    points.map(|p| std::mem::replace(&mut last, p).distance(p)).sum()
 }

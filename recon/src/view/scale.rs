@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::View;
 use crate::organs::ScaleSource;
+use crate::statistics::median;
 
 /// Fewest ground pixels, as a share of the picture: 2 % is 130 x 47 pixels at 640 x 480 (a guess).
 const MIN_GROUND: f64 = 0.02;
@@ -95,8 +96,8 @@ pub fn ground_plane(view: &View<'_>) -> Result<DepthScale, ScaleError> {
         return Err(ScaleError::FewPixels { expected, found: logs.len() });
     }
     let (exponent, offset) = line(&logs);
-    let mut away: Vec<f64> = logs.iter().map(|(x, y)| (exponent * x + offset - y).abs()).collect();
-    let spread = median(&mut away);
+    let away = logs.iter().map(|(x, y)| (exponent * x + offset - y).abs());
+    let spread = median(away).unwrap_or(f64::INFINITY);
     if !(spread <= MAX_SPREAD && offset.exp().is_normal()) {
         return Err(ScaleError::Spread { expected: MAX_SPREAD, found: spread });
     }
@@ -134,21 +135,11 @@ fn line(points: &[(f64, f64)]) -> (f64, f64) {
 /// [`ScaleError::NoDepth`] without an organ pixel with depth.
 pub fn nominal(view: &View<'_>) -> Result<DepthScale, ScaleError> {
     let pixels = view.semantic.as_raw().iter().zip(view.log_depth.as_raw());
-    let mut logs: Vec<f64> = pixels
+    let logs = pixels
         .filter(|&(&class, depth)| class != Semantic::Background as u8 && depth.is_finite())
-        .map(|(_, &depth)| f64::from(depth))
-        .collect();
-    if logs.is_empty() {
-        return Err(ScaleError::NoDepth);
-    }
-    let factor = NOMINAL_DEPTH * (-median(&mut logs)).exp();
+        .map(|(_, &depth)| f64::from(depth));
+    let factor = NOMINAL_DEPTH * (-median(logs).ok_or(ScaleError::NoDepth)?).exp();
     Ok(DepthScale { factor, exponent: 1.0, source: ScaleSource::None, spread: 0.0 })
-}
-
-/// The middle of at least one number, reordering them.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// The direction that is up in the frame the view is lifted into: the world's z, or the picture's, for a camera held

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use demeter_recon::cloud::PointCloud;
-use demeter_recon::metrics::quantile;
 use demeter_recon::model::Species;
 use demeter_recon::segment::{Labels, Up};
+use demeter_recon::statistics::quantile;
 use glam::DVec3;
 
 use super::baselines::{beziers, poisson, procedural, quadratics};
@@ -158,7 +158,7 @@ fn ours(fitted: &Fitted) -> Result<Scored, CommandError> {
 }
 
 fn row(species: &str, method: &str, scores: &[Scored]) -> Vec<Cell> {
-    let of = |value: fn(&Scored) -> f64, share| quantile(&scores.iter().map(value).collect::<Vec<_>>(), share);
+    let of = |value: fn(&Scored) -> f64, share| quantile(scores.iter().map(value), share);
     let per_organ = scores.iter().filter_map(|s| Some(s.bytes as f64 / s.organs? as f64));
     let goal = GOALS.iter().find(|goal| (goal.0, goal.1) == (species, method)).map(|goal| goal.2);
     vec![
@@ -170,6 +170,6 @@ fn row(species: &str, method: &str, scores: &[Scored]) -> Vec<Cell> {
         Cell::figure(of(|s| s.cd, 0.75), 4),
         Cell::figure(goal, 4),
         Cell::figure(of(|s| s.bytes as f64, 0.5), 0),
-        Cell::figure(quantile(&per_organ.collect::<Vec<_>>(), 0.5), 1),
+        Cell::figure(quantile(per_organ, 0.5), 1),
     ]
 }

@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use demeter_recon::baseline::{bezier, quadratic};
 use demeter_recon::fit;
-use demeter_recon::metrics::{chamfer, quantile};
+use demeter_recon::metrics::chamfer;
 use demeter_recon::model::{Detail, Knots, OrganKind, PlantMesh, Species};
 use demeter_recon::segment::{Labels, Up, segment};
+use demeter_recon::statistics::quantile;
 use glam::DVec3;
 
 use super::baselines::numbers;

@@ -2,8 +2,15 @@
 
 use glam::DVec3;
 
-use crate::fit::stem::median;
+use crate::cloud::thinned;
 use crate::nearest::{Nearest, Neighbour};
+use crate::statistics::median;
+
+/// Least standard deviation of points about a blade, as a share of its length: what a basis of a few dozen modes leaves
+/// (a guess).
+pub(in crate::fit) const NEAR: f64 = 0.002;
+/// A node farther from every point than this many spacings of the points has no data beside it.
+pub(in crate::fit) const BESIDE: f64 = 2.0;
 
 /// Points with what the fit asks of them again and again.
 pub(in crate::fit) struct Data {
@@ -16,13 +23,12 @@ pub(in crate::fit) struct Data {
 impl Data {
     /// At most `most` of the points, evenly.
     pub(in crate::fit) fn thinned(points: &[DVec3], most: usize) -> Self {
-        let stride = points.len().div_ceil(most).max(1);
-        let points: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
+        let points = thinned(points, most);
         let tree = Nearest::of(&points);
         let apart = |p: &DVec3| tree.k(*p, 8).last().map(Neighbour::distance);
         // Some of the points tell it well enough.
         let some = points.len().div_ceil(60);
-        let spacing = median(points.iter().step_by(some.max(1)).filter_map(apart).collect()).unwrap_or(0.0).max(1e-6);
+        let spacing = median(points.iter().step_by(some.max(1)).filter_map(apart)).unwrap_or(0.0).max(1e-6);
         Self { points, tree, spacing }
     }
 }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::equations::Pulls;
 use super::sheet::Sheet;
 use crate::fit::loss::Loss;
-use crate::fit::stem::quantile;
+use crate::statistics::quantile;
 
 /// Least depth of the strip in which points are counted, in standard deviations of the points: at 2 noise carries less
 /// than a hundredth of itself across the strip's inner line.
@@ -81,7 +81,7 @@ impl Counted<'_> {
             block.map(|n| self.node(n)).fold(Count::default(), Count::and).density()
         };
         let densities: Vec<f64> = inner.iter().map(|n| around(*n)).collect();
-        let least = HOLE * quantile(densities.clone(), FULL).unwrap_or(0.0);
+        let least = HOLE * quantile(&densities, FULL).unwrap_or(0.0);
         let seen = inner.iter().zip(densities).filter(|(_, density)| *density >= least).map(|(n, _)| self.node(*n));
         let seen = seen.fold(Count::default(), Count::and);
         if seen.points > 0.0 {

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::sheet::Sheet;
+use crate::polyline::path_length;
 use crate::traits::keys;
 
 /// Derivative of a trait by nodes of a sheet, per metre; nodes may repeat.
@@ -90,7 +91,7 @@ fn along(sheet: &Sheet, line: &[usize]) -> Field {
 }
 
 fn length(sheet: &Sheet, line: &[usize]) -> f64 {
-    line.windows(2).map(|pair| sheet.points[pair[0]].distance(sheet.points[pair[1]])).sum()
+    path_length(line.iter().map(|n| sheet.points[*n]))
 }
 
 /// Gradient of the sum of a line's turns over its length.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::data::Data;
+use super::data::{BESIDE, Data};
 use super::edges::Edges;
 use super::equations::{Pulls, Rows};
 use super::seen::Seen;
@@ -17,8 +17,6 @@ use crate::traits::Sigmas;
 
 /// Independent observations that a blade's points amount to: neighbours err together (a guess).
 const INDEPENDENT: f64 = 80.0;
-/// A node farther from every point than this many spacings of the points has no data beside it.
-pub(super) const BESIDE: f64 = 2.0;
 
 /// How closely the fit looks.
 pub(super) struct Level<'a> {

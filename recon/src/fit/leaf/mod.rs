@@ -18,13 +18,13 @@ use glam::{DQuat, DVec3};
 
 use super::centreline::course;
 use super::solver::minimise;
-use super::stem::{mean, median};
 use crate::model::Species;
 use crate::model::leaf::{Blade, Lattice, gauge};
+use crate::statistics::{deviation, mean};
 use crate::traits::Sigmas;
-use data::Data;
+use data::{BESIDE, Data, NEAR};
 use edges::Edges;
-use level::{BESIDE, Level};
+use level::Level;
 use seen::Seen;
 use state::State;
 
@@ -37,8 +37,6 @@ const FEW_POINTS: usize = 400;
 /// Nodes that bring it near, and nodes that finish it.
 const COARSE: Lattice = Lattice::every(4, 3);
 const FINE: Lattice = Lattice::every(2, 3);
-/// Least one when it is near, as a share of its length: what a basis of a few dozen modes leaves (a guess).
-const NEAR: f64 = 0.002;
 /// With few points: how many starts go on, for how many steps, and the standard deviation of the points about the
 /// model meanwhile, as a share of the blade's length (a guess): the nearer, the more a misfit tells.
 const HEATS: [(usize, usize, f64); 3] = [(usize::MAX, 2, 0.01), (2, 4, 0.005), (1, 5, 0.005)];
@@ -125,7 +123,7 @@ fn finish(
     let mut seen = Seen::of(state.sheet(species, FINE), &data, None);
     let (mut converged, mut sigmas) = (false, Sigmas::new());
     for round in 1..=ROUNDS {
-        let noise = 1.4826 * median(seen.heights.iter().map(|height| height.abs()).collect()).unwrap_or(0.0);
+        let noise = deviation(seen.heights.iter().copied());
         let sigma = noise.max(NEAR * state.metres());
         let edges = Some(Edges { noise, length: state.metres(), base: base_moves });
         let level = Level { data: &data, species, lattice: FINE, sigma, edges, nodes: seen.nodes, base_moves };
@@ -142,7 +140,7 @@ fn finish(
         base: state.base,
         rotation: (state.rotation * gauge(&raw).inverse()).normalize(),
         length: state.metres(),
-        residual: mean(seen.distances(&data)),
+        residual: mean(seen.distances(&data)).unwrap_or(0.0),
         visible: 1.0 - hidden / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE),
         blade: state.blade(),
         converged,

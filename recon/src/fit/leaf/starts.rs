@@ -4,11 +4,13 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::state::State;
 use crate::axes::PrincipalAxes;
-use crate::fit::centreline::{angles_along, length, resample};
+use crate::fit::centreline::{angles_along, resample};
 use crate::fit::orient::turn_onto;
-use crate::fit::stem::{clipped, mean};
+use crate::fit::stem::clipped;
 use crate::model::leaf::{Lattice, ROWS, vein_angle};
 use crate::model::{Habit, Species};
+use crate::polyline::path_length;
+use crate::statistics::mean;
 
 /// Standard deviation of the course's turn from one of its 44 bones to the next, radians (a guess: a kink of 5 degrees
 /// every few bones).
@@ -25,7 +27,7 @@ pub(super) fn along(course: &[DVec3], points: &[DVec3], up: DVec3, species: &Spe
     let chord = path[path.len() - 1] - path[0];
     let facing_up = |across: DVec3| if across.cross(chord).dot(up) < 0.0 { -across } else { across };
     let aside: Vec<DVec3> = points.iter().map(|p| *p - nearest_of(&path, *p)).collect();
-    let half_width = mean(aside.iter().map(|p| p.length()));
+    let half_width = mean(aside.iter().map(|p| p.length())).unwrap_or(0.0);
     let guess = |across: DVec3| guess(&path, half_width, facing_up(across), species);
     // The widest direction of the points about the course.
     let widest = PrincipalAxes::of(aside.iter().copied()).axes.x_axis;
@@ -40,7 +42,7 @@ pub(super) fn along(course: &[DVec3], points: &[DVec3], up: DVec3, species: &Spe
 
 /// `half_width` is the mean distance of the points from the path, metres.
 fn guess(path: &[DVec3], half_width: f64, across: DVec3, species: &Species) -> State {
-    let metres = species.ranges.blade_length.clamp(length(path));
+    let metres = species.ranges.blade_length.clamp(path_length(path.iter().copied()));
     let along = (path[1] - path[0]).normalize_or(DVec3::Y);
     let x = across.reject_from_normalized(along).normalize_or(along.any_orthonormal_vector());
     let rotation = DQuat::from_mat3(&DMat3::from_cols(x, along, x.cross(along)));
@@ -49,7 +51,7 @@ fn guess(path: &[DVec3], half_width: f64, across: DVec3, species: &Species) -> S
     let seen: Vec<(usize, f64)> =
         (1..ROWS).flat_map(|i| [0, 1].map(|k| (vein_angle(i) + k, vein[2 * (i - 1) + k]))).collect();
     let flat = species.leaf.flat(&[], 1.0);
-    let typical = mean(flat.iter().map(|p| p.x.abs())) * metres;
+    let typical = mean(flat.iter().map(|p| p.x.abs())).unwrap_or(0.0) * metres;
     let mut state = State {
         base: path[0],
         rotation,

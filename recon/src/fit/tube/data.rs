@@ -9,11 +9,12 @@ use super::{Rows, Tube};
 use crate::cloud::thinned;
 use crate::fit::loss::Loss;
 use crate::fit::solver::Normal;
-use crate::fit::stem::{first, mean, median};
+use crate::fit::stem::first;
 use crate::model::Species;
 use crate::model::stem::{BONES, POINTS};
 use crate::nearest::{Nearest, Neighbour};
 use crate::polyline::nearest_on;
+use crate::statistics::{deviation, mean, median};
 
 /// Most points of one stem that steer it.
 const MAX_POINTS: usize = 400;
@@ -58,7 +59,7 @@ impl TubeData {
         let points = thinned(points, MAX_POINTS);
         let search = Nearest::of(&points);
         let apart = |p: &DVec3| search.k(*p, 4).last().map(Neighbour::distance);
-        let spacing = median(points.iter().step_by(5).filter_map(apart).collect()).unwrap_or(0.0).max(1e-6);
+        let spacing = median(points.iter().step_by(5).filter_map(apart)).unwrap_or(0.0).max(1e-6);
         Self { points, search, spacing, log_radius: start.log_radius, stiffness: 1.0, base: start.base }
     }
 
@@ -71,7 +72,7 @@ impl TubeData {
     /// tube seen from one side, half of whose surface has no points, from a strip of noise beside too wide a tube.
     pub(in crate::fit) fn chamfer(&self, tube: &Tube, species: &Species) -> f64 {
         let rows = Rows::of(tube, species);
-        let to_surface = mean(self.beside(&rows).map(|b| (b.off.length() - tube.radius()).abs()));
+        let to_surface = mean(self.beside(&rows).map(|b| (b.off.length() - tube.radius()).abs())).unwrap_or(0.0);
         let ring = |bone: usize| {
             let (at, along) = (rows.place(bone, 0.5), rows.direction(bone));
             let side =
@@ -81,7 +82,7 @@ impl TubeData {
         };
         let surface: Vec<DVec3> = (0..BONES).flat_map(ring).collect();
         let to_points = |p: &DVec3| self.search.one(*p).map_or(0.0, |n| n.distance());
-        to_surface + mean(surface.iter().map(to_points)) / 2.0
+        to_surface + mean(surface.iter().map(to_points)).unwrap_or(0.0) / 2.0
     }
 
     fn beside<'a>(&'a self, rows: &'a Rows<'_>) -> impl ExactSizeIterator<Item = Beside> + 'a {
@@ -107,8 +108,7 @@ impl TubeData {
 
     /// Standard deviation of the points about the tube, metres.
     pub(in crate::fit) fn noise(&self, tube: &Tube, species: &Species) -> f64 {
-        // 1.4826 median deviations are one standard deviation of a normal distribution.
-        let noise = 1.4826 * median(self.misses(tube, species)).unwrap_or(0.0);
+        let noise = deviation(self.misses(tube, species));
         noise.max(NEAR * tube.metres())
     }
 

@@ -21,10 +21,11 @@ use state::{Body, Carried, Member, carried, over_place_and_d, stepped};
 
 use super::hanger::{Hanger, relative};
 use super::solver::minimise;
-use super::stem::{StemFit, mean};
+use super::stem::StemFit;
 use super::tube::{Rows, Tube, TubeData};
 use crate::model::kinematics::Similarity;
 use crate::model::{Form, Plant, PlantError, Species, forward, stem};
+use crate::statistics::mean;
 use crate::traits::Sigmas;
 
 /// Steps over the whole plant.
@@ -182,8 +183,8 @@ impl Data {
 
     fn residual(&self, member: &Member, species: &Species) -> Option<f64> {
         match (self, &member.body) {
-            (Self::Tube { data, .. }, Body::Tube(tube)) => Some(mean(data.misses(tube, species).into_iter())),
-            (Self::Blade(data), Body::Rigid(pose)) => Some(data.residual(pose)),
+            (Self::Tube { data, .. }, Body::Tube(tube)) => mean(data.misses(tube, species)),
+            (Self::Blade(data), Body::Rigid(pose)) => data.residual(pose),
             _ => None,
         }
     }

@@ -2,13 +2,13 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::fit::leaf::data::Data;
+use crate::fit::leaf::data::{BESIDE, Data, NEAR};
 use crate::fit::leaf::sheet::Sheet;
 use crate::fit::loss::Loss;
 use crate::fit::solver::Normal;
-use crate::fit::stem::{mean, median};
 use crate::model::leaf::{Blade, COLUMNS, Lattice, ROWS};
 use crate::model::{Ranges, Species};
+use crate::statistics::{deviation, mean};
 
 /// Most points of one blade that steer it.
 const MAX_POINTS: usize = 300;
@@ -16,13 +16,9 @@ const MAX_POINTS: usize = 300;
 const STEPS: (usize, usize) = (2, 3);
 /// Independent observations that a blade's points amount to: neighbours err together (a guess).
 const INDEPENDENT: f64 = 150.0;
-/// Least standard deviation of points about a blade, as a share of its length (a guess).
-const NEAR: f64 = 0.002;
 /// Standard deviation of the logarithm of the length that stage 1 found from the blade's edge, for which stage 2 does
 /// not look (a guess).
 const LENGTH_SIGMA: f64 = 0.003;
-/// A node farther from every point than this many spacings of the points has no data beside it.
-const BESIDE: f64 = 2.0;
 
 /// Where a blade is.
 #[derive(Clone, Debug)]
@@ -65,8 +61,7 @@ impl RigidData {
         let nodes = rows.flat_map(|row| row.iter().copied().step_by(STEPS.1)).collect();
         let data = Data::thinned(points, MAX_POINTS);
         let unjudged = Self { data, nodes, log_length: pose.log_length, sigma: f64::INFINITY };
-        // 1.4826 median deviations are one standard deviation of a normal distribution.
-        let noise = 1.4826 * median(unjudged.heights(pose)).unwrap_or(0.0);
+        let noise = deviation(unjudged.heights(pose));
         Self { sigma: noise.max(NEAR * pose.log_length.exp()), ..unjudged }
     }
 
@@ -83,8 +78,8 @@ impl RigidData {
         self.data.points.iter().map(height).collect()
     }
 
-    /// Mean distance of the points from the surface, metres.
-    pub(super) fn residual(&self, pose: &Rigid) -> f64 {
+    /// Mean distance of the points from the surface, metres; `None` without points.
+    pub(super) fn residual(&self, pose: &Rigid) -> Option<f64> {
         let sheet = self.sheet(pose);
         mean(self.data.points.iter().map(|p| {
             let n = sheet.nearest(*p, None);

@@ -51,7 +51,7 @@ fn moved(plant: &Plant, members: &[Member], steps: &[DVector<f64>], species: &Sp
 /// Mean distance between the control points of two poses, metres.
 fn distance(a: &PosedPlant, b: &PosedPlant) -> f64 {
     let pairs = a.control.iter().flatten().zip(b.control.iter().flatten());
-    mean(pairs.map(|(p, q)| p.distance(*q)).collect::<Vec<f64>>().into_iter())
+    mean(pairs.map(|(p, q)| p.distance(*q))).unwrap()
 }
 
 #[test]
