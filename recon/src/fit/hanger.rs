@@ -18,7 +18,7 @@ const ROOT_SHARE: f64 = 0.08;
 const MIN_ROOT: usize = 8;
 /// Metres that an organ goes on for each metre that it leaves its parent, at most: an angle of 15° between the two.
 const MAX_SLOPE: f64 = 3.9;
-/// Shares of the lowest points of a main stem, see [`first`].
+/// Shares of the points that say where an organ begins, see [`first`].
 const END_SHARES: [f64; 2] = [0.01, 0.02];
 
 /// A stem in the world.
@@ -67,15 +67,28 @@ impl Hanger {
         middle(&lowest(points, |p| distance_to_path(p, &self.path), FOOT_SHARE, 1, MAX_FOOT))
     }
 
-    /// The fraction d at which an organ that starts beside the stem leaves it: its points next to the stem, drawn on to
-    /// the axis. Leaves that leave at a small angle start well above where their first points are nearest.
+    /// The fraction d at which an organ leaves the stem's axis: where its points next to the stem begin, and from there
+    /// back along their course as far as they stay off the axis. Leaves that leave at a small angle start well above
+    /// where their first points are nearest.
     pub(super) fn root(&self, points: &[DVec3]) -> f64 {
         let near = lowest(points, |p| distance_to_path(p, &self.path), ROOT_SHARE, MIN_ROOT, usize::MAX);
         let (centre, away) = (middle(&near), mean(near.iter().map(|(away, _)| away)).unwrap_or(0.0));
-        let varies: f64 = near.iter().map(|(a, _)| (a - away).powi(2)).sum();
-        let follows: DVec3 = near.iter().map(|(a, p)| (*p - centre) * (a - away)).sum();
-        let slope = (follows / varies.max(f64::MIN_POSITIVE)).clamp_length_max(MAX_SLOPE);
-        self.nearest(centre - slope * away)
+        let course: DVec3 = near.iter().map(|(a, p)| (*p - centre) * (a - away)).sum();
+        let course = course.normalize_or_zero();
+        let begins = centre + course * first(near.iter().map(|(_, p)| (*p - centre).dot(course)).collect(), END_SHARES);
+        let (at, along) = self.place(self.nearest(centre));
+        let out = (centre - at).reject_from_normalized(along).normalize_or_zero();
+        // Points that reach the axis begin there, however far from it the middle of the first of them is.
+        let off = (begins - at).dot(out).min(first(near.iter().map(|(away, _)| *away).collect(), END_SHARES));
+        let slope = if course.dot(out) > 0.0 { course / course.dot(out) } else { DVec3::ZERO };
+        self.nearest(begins - slope.clamp_length_max(MAX_SLOPE) * off.max(0.0))
+    }
+
+    /// The place at d and the unit direction of the stem there.
+    fn place(&self, d: f64) -> (DVec3, DVec3) {
+        let bone = ((d * BONES as f64) as usize).min(BONES - 1);
+        let (from, to) = (self.path[bone], self.path[bone + 1]);
+        (from.lerp(to, d * BONES as f64 - bone as f64), (to - from).normalize_or_zero())
     }
 }
 
@@ -101,4 +114,33 @@ fn middle(points: &[(f64, DVec3)]) -> DVec3 {
 pub(super) fn relative(joint: DQuat, child: DQuat) -> DQuat {
     let q = (joint.inverse() * child).normalize();
     if q.w < 0.0 { -q } else { q }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::stem::fit_path;
+    use crate::species::shipped;
+
+    /// A blade of 40 cm that leaves an upright stem of 2 cm at a height of 0.4 m, rising at `angle` from it.
+    fn blade(angle: f64) -> Vec<DVec3> {
+        let (along, across) = (DVec3::new(angle.sin(), 0.0, angle.cos()), DVec3::Y);
+        let at = |i: usize, j: usize| along * (i as f64 / 400.0) + across * (0.002 * (j as f64 - 10.0));
+        (0..160).flat_map(|i| (0..21).map(move |j| DVec3::Z * 0.4 + at(i, j))).collect()
+    }
+
+    #[test]
+    fn roots_are_where_blades_leave_the_axis_seen_from_it_or_from_the_surface() {
+        let species = shipped("maize").expect("listed").expect("valid");
+        let mut stem = fit_path(&[DVec3::ZERO, DVec3::Z], &species);
+        stem.radius = 0.01;
+        let hanger = Hanger::of(&stem, DVec3::ZERO, &species);
+        for degrees in [20.0_f64, 40.0, 70.0] {
+            let whole = blade(degrees.to_radians());
+            let outside: Vec<DVec3> = whole.iter().copied().filter(|p| p.truncate().length() > stem.radius).collect();
+            let (from_axis, from_surface) = (hanger.root(&whole), hanger.root(&outside));
+            assert!((from_axis - 0.4).abs() < 0.004, "{degrees}: {from_axis}");
+            assert!((from_surface - 0.4).abs() < 0.01, "{degrees}: {from_surface}");
+        }
+    }
 }

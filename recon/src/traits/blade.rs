@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{Traits, Unit, keys, put};
 use crate::model::PlantMesh;
 use crate::model::leaf::{COLUMNS, ROWS, VEIN, node};
-use crate::polyline::{distance_to_path, path_length};
+use crate::polyline::path_length;
 
 /// Rows of the main vein whose chord is the direction in which a blade leaves its stem: a quarter.
 const FIRST_QUARTER: usize = (ROWS - 1) / 4;
@@ -25,20 +25,11 @@ pub(super) fn areas(mesh: &PlantMesh, organs: usize) -> Vec<(f64, DVec3)> {
     areas
 }
 
-/// The stem that carries a blade, in the world.
-pub(super) struct Carrier<'a> {
-    /// Control points.
-    pub path: &'a [DVec3],
-    /// Metres.
-    pub radius: f64,
-    /// Where it points where the blade leaves it.
-    pub direction: DVec3,
-}
-
-/// Measures a blade from its control points in the world, its area and normal, and the stem that carries it.
-pub(super) fn measure(traits: &mut Traits, control: &[DVec3], (area, normal): (f64, DVec3), stem: &Carrier<'_>) {
+/// Measures a blade from its control points in the world, its area and normal, and the direction of the stem that
+/// carries it where it hangs.
+pub(super) fn measure(traits: &mut Traits, control: &[DVec3], (area, normal): (f64, DVec3), stem: DVec3) {
     let vein: Vec<DVec3> = (0..ROWS).map(|i| control[node(i, VEIN)]).collect();
-    let along = path_length(vein.iter().copied()) - inside(&vein, stem);
+    let along = path_length(vein.iter().copied());
     let rows = (1..ROWS - 1).map(|i| path_length(control[node(i, 0)..node(i, COLUMNS)].iter().copied()));
     put(traits, keys::LEAF_AREA, area, Unit::SquareMetre);
     put(traits, keys::LEAF_LENGTH, along, Unit::Metre);
@@ -53,7 +44,7 @@ pub(super) fn measure(traits: &mut Traits, control: &[DVec3], (area, normal): (f
     if chord.truncate().length() > 1e-3 * chord.length() {
         put(traits, keys::LEAF_AZIMUTH, chord.y.atan2(chord.x), Unit::Radian);
     }
-    let leaving = (vein[FIRST_QUARTER] - vein[0]).angle_between(stem.direction);
+    let leaving = (vein[FIRST_QUARTER] - vein[0]).angle_between(stem);
     if leaving.is_finite() {
         put(traits, keys::LEAF_INSERTION_ANGLE, leaving, Unit::Radian);
     }
@@ -61,14 +52,4 @@ pub(super) fn measure(traits: &mut Traits, control: &[DVec3], (area, normal): (f
     if along > 0.0 {
         put(traits, keys::LEAF_CURVATURE, turns.sum::<f64>() / along, Unit::PerMetre);
     }
-}
-
-/// Length of the part of a main vein, from its base, that lies inside the stem: in the model organs begin on the axis of
-/// what carries them, a tape begins at its surface.
-fn inside(vein: &[DVec3], stem: &Carrier<'_>) -> f64 {
-    let away: Vec<f64> = vein.iter().map(|p| distance_to_path(*p, stem.path)).collect();
-    let Some(out) = away.iter().position(|away| *away > stem.radius) else { return 0.0 };
-    let Some(last) = out.checked_sub(1) else { return 0.0 };
-    let share = (stem.radius - away[last]) / (away[out] - away[last]);
-    path_length(vein[..out].iter().copied()) + share * vein[last].distance(vein[out])
 }

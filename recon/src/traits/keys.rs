@@ -22,8 +22,8 @@ pub const BLADE_COUNT_VISIBLE: &str = "blade_count_visible";
 /// without petioles.
 pub const LEAF_AREA: &str = "leaf_area";
 
-/// Blade: length of the main vein from where it leaves the stem's surface to its tip along the bends, m. Plant: mean
-/// over its blades. By hand: a tape laid along the midrib from the collar.
+/// Blade: length of the main vein from its base to its tip along the bends, m. Plant: mean over its blades. By hand: a
+/// tape laid along the midrib; from the collar it reads less by the way from the stem's axis to its surface.
 pub const LEAF_LENGTH: &str = "leaf_length";
 
 /// Blade: longest row from edge to edge across the main vein, along the bends, m. Plant: mean over its blades. By

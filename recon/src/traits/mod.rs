@@ -87,10 +87,8 @@ impl PlantTraits {
         let areas = blade::areas(&mesh, plant.organs.len());
         for (i, organ) in plant.organs.iter().enumerate() {
             if let (Form::Leaf { .. }, Some(parent)) = (&organ.form, organ.parent) {
-                let path = &posed.control[parent];
-                let direction = branching::direction(path, organ.joint.d);
-                let stem = blade::Carrier { path, radius: posed.radius[parent], direction };
-                blade::measure(&mut organs[i], &posed.control[i], areas[i], &stem);
+                let stem = branching::direction(&posed.control[parent], organ.joint.d);
+                blade::measure(&mut organs[i], &posed.control[i], areas[i], stem);
             }
         }
         let mut whole = summary(plant, &organs);
