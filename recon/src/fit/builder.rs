@@ -3,9 +3,12 @@
 use glam::DVec3;
 
 use super::hanger::{Hanger, relative};
+use super::leaf::crowd::Crowd;
+use super::leaf::smeared::{self, Cloud};
+use super::leaf::{self, LeafFit};
 use super::stem::StemFit;
 use super::whole::Evidence;
-use super::{FitError, OrganFit, leaf, stem};
+use super::{FitError, OrganFit, stem};
 use crate::cloud::diagonal;
 use crate::model::kinematics::Similarity;
 use crate::model::{Form, Habit, Joint, Organ, OrganKind, PlantError, Species};
@@ -27,6 +30,16 @@ pub(super) struct Builder<'a> {
     hangers: Vec<Option<Hanger>>,
     /// Petioles that were put in: their organ and their far end.
     petioles: Vec<(usize, DVec3)>,
+    blades: Vec<HungBlade>,
+}
+
+/// A blade of the plant.
+struct HungBlade {
+    /// Its organ.
+    organ: usize,
+    /// What it hangs on.
+    joint: Similarity,
+    fit: LeafFit,
 }
 
 /// The data of one organ.
@@ -50,6 +63,7 @@ impl<'a> Builder<'a> {
             evidence: Vec::new(),
             hangers: Vec::new(),
             petioles: Vec::new(),
+            blades: Vec::new(),
         };
         let fit = stem::fit(main.points, ground.translation, species);
         builder.add_stem(None, 0.0, ground, &fit, Some(main));
@@ -141,21 +155,50 @@ impl<'a> Builder<'a> {
 
     fn add_leaf(&mut self, parent: usize, d: f64, joint: Similarity, source: Source<'a>) -> usize {
         let fit = leaf::fit(source.points, joint.translation, self.up, self.species);
+        let organ = self.organs.len();
         self.hangers.push(None);
-        self.organs.push(Organ {
-            parent: Some(parent),
-            joint: Joint { d, rotation: relative(joint.rotation, fit.rotation), scale: fit.length / joint.scale },
-            form: Form::Leaf { blade: fit.blade, leaf: 0 },
-        });
         self.evidence.push(Evidence { points: source.points, radius_known: false });
-        self.fits.push(OrganFit {
-            source: Some(source.organ),
-            points: source.points.len(),
-            residual: Some(fit.residual),
-            visible_fraction: Some(fit.visible),
-            converged: fit.converged,
-            sigmas: fit.sigmas,
-        });
-        self.organs.len() - 1
+        self.organs.push(Organ { parent: Some(parent), ..blade(d, joint, &fit) });
+        self.fits.push(OrganFit { source: Some(source.organ), points: source.points.len(), ..outcome(&fit) });
+        self.blades.push(HungBlade { organ, joint, fit });
+        organ
+    }
+
+    /// Fits blades again that are hardly larger than the noise; `count` tells the points of an organ of the tree.
+    pub(super) fn sharpen(&mut self, count: impl Fn(usize) -> usize) {
+        let counts: Vec<usize> = self.fits.iter().map(|fit| fit.source.map_or(0, &count)).collect();
+        let each = |organ: usize| counts[organ] as f64 / self.evidence[organ].points.len().max(1) as f64;
+        let fits: Vec<_> = self.blades.iter().map(|hung| (&hung.fit, each(hung.organ))).collect();
+        let Some(crowd) = Crowd::of(&fits) else { return };
+        for HungBlade { organ, joint, fit } in &self.blades {
+            let points = self.evidence[*organ].points;
+            let cloud = Cloud { points, count: counts[*organ], base: joint.translation, up: self.up };
+            if let Some(fit) = smeared::again(fit, cloud, self.species, crowd) {
+                let (old, said) = (&mut self.organs[*organ], &mut self.fits[*organ]);
+                *old = Organ { parent: old.parent, ..blade(old.joint.d, *joint, &fit) };
+                *said = OrganFit { source: said.source, points: said.points, ..outcome(&fit) };
+            }
+        }
+    }
+}
+
+/// A blade that hangs on a joint at `d` of a parent yet to be said.
+fn blade(d: f64, joint: Similarity, fit: &LeafFit) -> Organ {
+    Organ {
+        parent: None,
+        joint: Joint { d, rotation: relative(joint.rotation, fit.rotation), scale: fit.length / joint.scale },
+        form: Form::Leaf { blade: fit.blade.clone(), leaf: 0 },
+    }
+}
+
+/// What is said of a blade but for its points.
+fn outcome(fit: &LeafFit) -> OrganFit {
+    OrganFit {
+        source: None,
+        points: 0,
+        residual: Some(fit.residual),
+        visible_fraction: Some(fit.visible),
+        converged: fit.converged,
+        sigmas: fit.sigmas.clone(),
     }
 }

@@ -85,6 +85,7 @@ pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, F
             parent
         }));
     }
+    builder.sharpen(|organ| tree.organs[organ].points.len());
     leaflets::group(&mut builder.organs, species.habit);
     let mut plant = Plant { world_from_plant, organs: builder.organs };
     let outcomes = whole::refine(&mut plant, &builder.evidence, species)?;

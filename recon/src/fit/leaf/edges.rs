@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::equations::Pulls;
 use super::sheet::Sheet;
 use crate::fit::loss::Loss;
+use crate::model::leaf::Lattice;
 use crate::statistics::quantile;
 
 /// Least depth of the strip in which points are counted, in standard deviations of the points: at 2 noise carries less
@@ -38,10 +39,11 @@ pub(super) struct Edges {
 }
 
 /// Points counted on the area that nodes stand for.
-#[derive(Clone, Copy, Default)]
-struct Count {
-    points: f64,
-    area: f64,
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Count {
+    pub points: f64,
+    /// Square metres.
+    pub area: f64,
 }
 
 impl Count {
@@ -49,7 +51,8 @@ impl Count {
         Self { points: self.points + other.points, area: self.area + other.area }
     }
 
-    fn density(self) -> f64 {
+    /// Points per square metre.
+    pub(super) fn density(self) -> f64 {
         self.points / self.area.max(f64::MIN_POSITIVE)
     }
 }
@@ -73,8 +76,8 @@ impl Counted<'_> {
         self.sheet.points[self.sheet.lattice.node(row, column)]
     }
 
-    /// Points per square metre of what `inner` nodes hold outside holes; of everything when there are none.
-    fn density(&self, inner: &[usize]) -> f64 {
+    /// What `inner` nodes hold outside holes.
+    fn seen(&self, inner: &[usize]) -> Count {
         let columns = self.sheet.lattice.columns();
         let around = |n: usize| {
             let block = [n - columns, n, n + columns].into_iter().flat_map(|n| [n - 1, n, n + 1]);
@@ -83,11 +86,7 @@ impl Counted<'_> {
         let densities: Vec<f64> = inner.iter().map(|n| around(*n)).collect();
         let least = HOLE * quantile(&densities, FULL).unwrap_or(0.0);
         let seen = inner.iter().zip(densities).filter(|(_, density)| *density >= least).map(|(n, _)| self.node(*n));
-        let seen = seen.fold(Count::default(), Count::and);
-        if seen.points > 0.0 {
-            return seen.density();
-        }
-        (0..self.counts.len()).map(|n| self.node(n)).fold(Count::default(), Count::and).density()
+        seen.fold(Count::default(), Count::and)
     }
 }
 
@@ -97,13 +96,13 @@ impl Edges {
         let lattice = sheet.lattice;
         let (rows, columns) = (lattice.rows(), lattice.columns());
         let counted = Counted { sheet, counts };
-        let wide = |i: usize| counted.at(i, 0).distance(counted.at(i, columns - 1)) / (columns - 1) as f64;
-        let deep: Vec<usize> = (0..rows).map(|i| self.deep(wide(i))).collect();
-        let long = |i: usize| counted.at(i, columns / 2).distance(counted.at(i + 1, columns / 2));
-        let (from, to) = (self.deep(long(0)), rows - self.deep(long(rows - 2)).min(rows - 1));
-        let inner =
-            (from..to).flat_map(|i| (deep[i]..columns.saturating_sub(deep[i])).map(move |j| lattice.node(i, j)));
-        let density = counted.density(&inner.collect::<Vec<_>>());
+        let margin = self.margin(&counted);
+        let Margin { deep, from, to } = &margin;
+        let mut inner = counted.seen(&margin.inner(lattice));
+        if inner.points <= 0.0 {
+            inner = (0..counts.len()).map(|n| counted.node(n)).fold(Count::default(), Count::and);
+        }
+        let density = inner.density();
         if density <= 0.0 {
             return;
         }
@@ -126,7 +125,7 @@ impl Edges {
                 self.pull_strip(&strip, density, pulls);
             }
         }
-        let ends = [(rows - 1, rows - 2, to..rows), (0, 1, 0..from)];
+        let ends = [(rows - 1, rows - 2, *to..rows), (0, 1, 0..*from)];
         for (end, next, strip) in ends.into_iter().take(if self.base { 2 } else { 1 }) {
             let inside = if end == 0 { strip.end } else { strip.start }.clamp(GUARD, rows - GUARD);
             let guard = if end == 0 { inside..inside + GUARD } else { inside - GUARD..inside };
@@ -140,6 +139,24 @@ impl Edges {
                 shared: 1.0,
             };
             self.pull_strip(&strip, density, pulls);
+        }
+    }
+
+    /// What the blade holds inside its edges, holes and all; nothing when it is all edge.
+    pub(super) fn inner(&self, sheet: &Sheet, counts: &[f64]) -> Count {
+        let counted = Counted { sheet, counts };
+        let inner = self.margin(&counted).inner(sheet.lattice);
+        inner.into_iter().map(|n| counted.node(n)).fold(Count::default(), Count::and)
+    }
+
+    fn margin(&self, counted: &Counted<'_>) -> Margin {
+        let (rows, columns) = (counted.sheet.lattice.rows(), counted.sheet.lattice.columns());
+        let wide = |i: usize| counted.at(i, 0).distance(counted.at(i, columns - 1)) / (columns - 1) as f64;
+        let long = |i: usize| counted.at(i, columns / 2).distance(counted.at(i + 1, columns / 2));
+        Margin {
+            deep: (0..rows).map(|i| self.deep(wide(i))).collect(),
+            from: self.deep(long(0)),
+            to: rows - self.deep(long(rows - 2)).min(rows - 1),
         }
     }
 
@@ -161,6 +178,23 @@ impl Edges {
         let counting = (expected + 1.0).sqrt() / per_metre;
         let sigma = counting.hypot(RAGGED * self.length) * strip.shared.sqrt();
         pulls.along(strip.node, outwards, miss, Loss::bounded(miss, sigma, MOST));
+    }
+}
+
+/// Where the strips along the edge end.
+struct Margin {
+    /// Columns that each row's two strips take.
+    deep: Vec<usize>,
+    /// First row that is not the base's, first row that is the tip's.
+    from: usize,
+    to: usize,
+}
+
+impl Margin {
+    /// Nodes of no strip.
+    fn inner(&self, lattice: Lattice) -> Vec<usize> {
+        let row = |i: usize| self.deep[i]..lattice.columns().saturating_sub(self.deep[i]);
+        (self.from..self.to).flat_map(|i| row(i).map(move |j| lattice.node(i, j))).collect()
     }
 }
 

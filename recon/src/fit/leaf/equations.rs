@@ -102,6 +102,15 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Derivatives of every node's x, y and z in turn, a column each, by the parameters.
+    pub(super) fn by_places(&self) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(self.parameters, 3 * self.sheet.points.len());
+        for (column, cells) in matrix.as_mut_slice().chunks_exact_mut(self.parameters).enumerate() {
+            self.add_gradient(column / 3, DVec3::AXES[column % 3], cells);
+        }
+        matrix
+    }
+
     fn add(&mut self, n: usize, direction: DVec3, weight: f64, weighted: f64) {
         if weight <= 0.0 {
             return;

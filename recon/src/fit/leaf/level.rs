@@ -6,7 +6,6 @@ use super::data::{BESIDE, Data};
 use super::edges::Edges;
 use super::equations::{Pulls, Rows};
 use super::seen::Seen;
-use super::sheet::Sheet;
 use super::state::State;
 use super::uncertainty;
 use crate::fit::loss::Loss;
@@ -16,7 +15,7 @@ use crate::model::{Habit, Species};
 use crate::traits::Sigmas;
 
 /// Independent observations that a blade's points amount to: neighbours err together (a guess).
-const INDEPENDENT: f64 = 80.0;
+pub(super) const INDEPENDENT: f64 = 80.0;
 
 /// How closely the fit looks.
 pub(super) struct Level<'a> {
@@ -35,14 +34,12 @@ pub(super) struct Level<'a> {
 impl Level<'_> {
     /// The uncertainty of the blade's traits, when `state` is where the fit ends.
     pub(super) fn sigmas(&self, state: &State, up: DVec3) -> Sigmas {
-        let jacobian = self.species.leaf.jacobian_on(&state.blade(), self.lattice);
-        let sheet = Sheet::new(jacobian.points.iter().map(|p| state.place(*p)).collect(), self.lattice);
+        let (sheet, jacobian) = state.linearised(self.species, self.lattice);
         uncertainty::sigmas(self.normal(state).h, &Rows::new(state, &sheet, &jacobian, self.base_moves), up)
     }
 
     pub(super) fn normal(&self, state: &State) -> Normal {
-        let jacobian = self.species.leaf.jacobian_on(&state.blade(), self.lattice);
-        let sheet = Sheet::new(jacobian.points.iter().map(|p| state.place(*p)).collect(), self.lattice);
+        let (sheet, jacobian) = state.linearised(self.species, self.lattice);
         let seen = Seen::of(sheet, self.data, Some(&self.nodes));
         let sheet = &seen.sheet;
         let mut pulls = Pulls::on(sheet.points.len());
@@ -71,13 +68,18 @@ impl Level<'_> {
             edges.pull(sheet, &seen.counts, &mut pulls);
         }
         let mut normal = pulls.linearise(state, sheet, &jacobian, self.base_moves);
-        let coefficients = State::COEFFICIENTS..State::COEFFICIENTS + jacobian.coefficients - 1;
-        for (i, c) in coefficients.clone().zip(state.beta.iter().chain(&state.gamma)) {
-            normal.prior(i, *c, 1.0);
-        }
-        // s_x is 1 outside grasses: a pull no data outweighs keeps the step at 0.
-        let weight = if self.species.habit == Habit::Grass { 1.0 } else { 1e12 };
-        normal.prior(coefficients.end, 0.0, weight);
+        priors(&mut normal, state, self.species);
         normal
     }
+}
+
+/// Adds the priors on β, γ and s_x.
+pub(super) fn priors(normal: &mut Normal, state: &State, species: &Species) {
+    let coefficients = state.beta.iter().chain(&state.gamma);
+    for (i, c) in coefficients.enumerate() {
+        normal.prior(State::COEFFICIENTS + i, *c, 1.0);
+    }
+    // s_x is 1 outside grasses: a pull no data outweighs keeps the step at 0.
+    let weight = if species.habit == Habit::Grass { 1.0 } else { 1e12 };
+    normal.prior(State::COEFFICIENTS + state.beta.len() + state.gamma.len(), 0.0, weight);
 }

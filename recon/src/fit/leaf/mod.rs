@@ -1,6 +1,7 @@
 //! One blade alone: pose, size, shape and deformation by damped Gauss-Newton on both directions of the Chamfer
 //! distance, robustly and with priors on β and γ (paper eq. 7; stage 1 of spec/reconstruction.md).
 
+pub(super) mod crowd;
 pub(super) mod data;
 mod edges;
 mod equations;
@@ -8,6 +9,7 @@ mod fields;
 mod level;
 mod seen;
 pub(super) mod sheet;
+pub(super) mod smeared;
 mod starts;
 mod state;
 mod uncertainty;
@@ -23,7 +25,7 @@ use crate::model::leaf::{Blade, Lattice, gauge};
 use crate::statistics::{deviation, mean};
 use crate::traits::Sigmas;
 use data::{BESIDE, Data, NEAR};
-use edges::Edges;
+use edges::{Count, Edges};
 use level::Level;
 use seen::Seen;
 use state::State;
@@ -61,6 +63,11 @@ pub(crate) struct LeafFit {
     pub converged: bool,
     /// How sure its traits are.
     pub sigmas: Sigmas,
+    /// Standard deviation of the points about the surface, metres.
+    noise: f64,
+    /// What it holds inside its edges.
+    inner: Count,
+    state: State,
 }
 
 /// Fits a blade whose base is attached at `base`; `up` tells the upper side where the cloud cannot.
@@ -121,9 +128,9 @@ fn finish(
     let (_, mut state) = starts.swap_remove(0);
     let data = Data::thinned(points, MAX_POINTS);
     let mut seen = Seen::of(state.sheet(species, FINE), &data, None);
-    let (mut converged, mut sigmas) = (false, Sigmas::new());
+    let (mut converged, mut sigmas, mut noise, mut inner) = (false, Sigmas::new(), 0.0, Count::default());
     for round in 1..=ROUNDS {
-        let noise = deviation(seen.heights.iter().copied());
+        noise = deviation(seen.heights.iter().copied());
         let sigma = noise.max(NEAR * state.metres());
         let edges = Some(Edges { noise, length: state.metres(), base: base_moves });
         let level = Level { data: &data, species, lattice: FINE, sigma, edges, nodes: seen.nodes, base_moves };
@@ -131,19 +138,28 @@ fn finish(
         seen = Seen::of(state.sheet(species, FINE), &data, Some(&level.nodes));
         if round == ROUNDS {
             sigmas = level.sigmas(&state, up);
+            inner = level.edges.map_or(inner, |edges| edges.inner(&seen.sheet, &seen.counts));
         }
     }
+    LeafFit { converged, sigmas, noise, inner, ..finished(state, &seen, &data, species) }
+}
+
+/// A fit that ended at `state`, but for what the way there told.
+fn finished(state: State, seen: &Seen, data: &Data, species: &Species) -> LeafFit {
     let areas = &seen.sheet.areas;
-    let hidden: f64 = seen.gaps(&data, BESIDE * data.spacing).map(|(n, _)| areas[n]).sum();
+    let hidden: f64 = seen.gaps(data, BESIDE * data.spacing).map(|(n, _)| areas[n]).sum();
     let raw = species.leaf.points(&state.blade(), Lattice::WHOLE);
     LeafFit {
         base: state.base,
         rotation: (state.rotation * gauge(&raw).inverse()).normalize(),
         length: state.metres(),
-        residual: mean(seen.distances(&data)).unwrap_or(0.0),
+        residual: mean(seen.distances(data)).unwrap_or(0.0),
         visible: 1.0 - hidden / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE),
         blade: state.blade(),
-        converged,
-        sigmas,
+        converged: false,
+        sigmas: Sigmas::new(),
+        noise: 0.0,
+        inner: Count::default(),
+        state,
     }
 }

@@ -47,6 +47,24 @@ impl Sheet {
         }
     }
 
+    /// Derivative of the sum of the nodes' areas, each times a weight, by the place of each node.
+    pub(in crate::fit) fn area_gradient(&self, weights: &[f64]) -> Vec<DVec3> {
+        let mut gradient = vec![DVec3::ZERO; self.points.len()];
+        for i in 0..self.lattice.rows() - 1 {
+            for j in 0..self.lattice.columns() - 1 {
+                let cell = cell(self.lattice, i, j);
+                let [a, b, c, d] = cell.map(|n| self.points[n]);
+                let weight = cell.into_iter().map(|n| weights[n]).sum::<f64>() / 4.0;
+                let normal = (c - a).cross(d - b).normalize_or_zero() * (weight / 2.0);
+                let (of_c, of_d) = ((d - b).cross(normal), normal.cross(c - a));
+                for (n, by) in cell.into_iter().zip([-of_c, -of_d, of_c, of_d]) {
+                    gradient[n] += by;
+                }
+            }
+        }
+        gradient
+    }
+
     pub(in crate::fit) fn on_edge(&self, n: usize) -> bool {
         let (row, column) = (n / self.lattice.columns(), n % self.lattice.columns());
         row == 0 || row == self.lattice.rows() - 1 || column == 0 || column == self.lattice.columns() - 1
@@ -90,12 +108,17 @@ fn normals(points: &[DVec3], lattice: Lattice) -> Vec<DVec3> {
     (0..points.len()).map(normal).collect()
 }
 
+/// The corners of a cell, in turn.
+fn cell(lattice: Lattice, i: usize, j: usize) -> [usize; 4] {
+    [lattice.node(i, j), lattice.node(i, j + 1), lattice.node(i + 1, j + 1), lattice.node(i + 1, j)]
+}
+
 /// A quarter of each cell's area to each of its corners.
 fn areas(points: &[DVec3], lattice: Lattice) -> Vec<f64> {
     let mut areas = vec![0.0; points.len()];
     for i in 0..lattice.rows() - 1 {
         for j in 0..lattice.columns() - 1 {
-            let cell = [lattice.node(i, j), lattice.node(i, j + 1), lattice.node(i + 1, j + 1), lattice.node(i + 1, j)];
+            let cell = cell(lattice, i, j);
             let [a, b, c, d] = cell.map(|n| points[n]);
             let area = (c - a).cross(d - b).length() / 2.0;
             cell.into_iter().for_each(|n| areas[n] += area / 4.0);

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use super::sheet::Sheet;
 use crate::fit::stem::clipped;
 use crate::model::Species;
-use crate::model::leaf::{Blade, Lattice};
+use crate::model::leaf::{Blade, BladeJacobian, Lattice};
 
 /// A blade on its way to the data; angles as of the raw chain, before the gauge.
 #[derive(Clone, Debug)]
@@ -45,6 +45,12 @@ impl State {
     pub(super) fn sheet(&self, species: &Species, lattice: Lattice) -> Sheet {
         let raw = species.leaf.points(&self.blade(), lattice);
         Sheet::new(raw.into_iter().map(|p| self.place(p)).collect(), lattice)
+    }
+
+    /// The surface at a lattice's nodes with the raw chain's derivatives there.
+    pub(super) fn linearised(&self, species: &Species, lattice: Lattice) -> (Sheet, BladeJacobian) {
+        let jacobian = species.leaf.jacobian_on(&self.blade(), lattice);
+        (Sheet::new(jacobian.points.iter().map(|p| self.place(*p)).collect(), lattice), jacobian)
     }
 
     /// The state after a step (rotation vector in the world, ln length, β, γ, ln s_x and, where the base may move, its
