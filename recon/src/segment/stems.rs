@@ -80,6 +80,8 @@ struct Division {
     children: Vec<Vec<usize>>,
     /// Leaves at and beyond each node.
     leaves: Vec<usize>,
+    /// Side stems at and beyond each node, petiolules left out.
+    sides: Vec<usize>,
     /// Length of the longest path beyond each node, metres.
     beyond: Vec<f64>,
     /// Mean distance of each node's points from its centre, metres.
@@ -106,6 +108,7 @@ impl Division {
         let mut division = Self {
             children,
             leaves: vec![0; n],
+            sides: vec![0; n],
             beyond: vec![0.0; n],
             radius,
             least,
@@ -114,6 +117,7 @@ impl Division {
             skeleton,
         };
         division.count_leaves(hangs, habit);
+        division.count_sides();
         division.walk();
         division
     }
@@ -146,12 +150,23 @@ impl Division {
         }
     }
 
+    fn count_sides(&mut self) {
+        for k in (0..self.sides.len()).rev() {
+            if self.leaves[k] > 1 {
+                self.sides[k] += self.branches(k).len().saturating_sub(1);
+            }
+            if let Some(p) = self.skeleton.parent[k] {
+                self.sides[p] += self.sides[k];
+            }
+        }
+    }
+
     /// Gives nodes to organs, from the base on: at a fork the organ goes on along one child, and every other child
     /// long enough starts an organ of its own.
     fn walk(&mut self) {
         for k in 0..self.children.len() {
             let organ = self.organ_of[k];
-            let branches: Vec<usize> = self.children[k].iter().copied().filter(|c| self.is_branch(k, *c)).collect();
+            let branches = self.branches(k);
             let onward = self.onward(k, organ, &branches);
             for c in self.children[k].clone() {
                 self.organ_of[c] = if Some(c) == onward || !branches.contains(&c) {
@@ -164,6 +179,11 @@ impl Division {
         }
     }
 
+    /// The children of a node that are no bumps of it.
+    fn branches(&self, k: usize) -> Vec<usize> {
+        self.children[k].iter().copied().filter(|c| self.is_branch(k, *c)).collect()
+    }
+
     fn is_branch(&self, k: usize, child: usize) -> bool {
         let before = self.back(k, 2);
         let thick = self.radius[k].min(self.radius[before]);
@@ -172,13 +192,14 @@ impl Division {
         self.beyond[child] + step > least
     }
 
-    /// The child along which an organ goes on: the one with most leaves, of equal ones the straightest. A main stem or
-    /// branch ends at its last fork unless one child goes straight on.
+    /// The child along which an organ goes on: the one with most side stems (blades may touch stems that do not carry
+    /// them), of equal ones that with most leaves, and then the straightest. A main stem or branch ends at its last fork
+    /// unless one child goes straight on.
     fn onward(&self, k: usize, organ: usize, branches: &[usize]) -> Option<usize> {
         let turn = |c: usize| self.straightness(k, c);
         let better = |a: &usize, b: &usize| {
-            let most = self.leaves[*a].max(1).cmp(&self.leaves[*b].max(1));
-            most.then(turn(*a).total_cmp(&turn(*b)))
+            let most = |x: usize| (self.sides[x], self.leaves[x].max(1));
+            most(*a).cmp(&most(*b)).then(turn(*a).total_cmp(&turn(*b)))
         };
         let best = branches.iter().copied().max_by(better)?;
         let carries_several = self.leaves[best] > 1 || (organ != 0 && self.leaves[k] <= 1);

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use demeter_recon::metrics::{Agreement, Pair};
 use demeter_recon::segment::{Labels, Up};
 use demeter_recon::species;
+use demeter_recon::statistics::median;
 use demeter_recon::traits::keys;
 use glam::DVec3;
 
@@ -160,7 +161,8 @@ fn internodes(truth: &Truth, fitted: &Fitted, matched: &BTreeMap<i32, usize>) ->
             parent => organ = parent,
         }
     };
-    // Place of each node on the true and on the found stem; blades of one leaf agree on both.
+    // Place of each blade's node on the true and on the found stem. Of a node's blades one may hang on a stem that it
+    // merely touches, so that the node is where most of them are.
     let mut nodes: Vec<(f64, f64)> = (matched.iter())
         .filter_map(|(id, organ)| {
             let hung = truth.on_main_stem(*id as usize)?;
@@ -169,7 +171,10 @@ fn internodes(truth: &Truth, fitted: &Fitted, matched: &BTreeMap<i32, usize>) ->
         .collect();
     nodes.push((0.0, 0.0));
     nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
-    nodes.dedup_by(|later, earlier| later.0 - earlier.0 < SAME_NODE);
+    let nodes: Vec<(f64, f64)> = nodes
+        .chunk_by(|earlier, later| later.0 - earlier.0 < SAME_NODE)
+        .filter_map(|node| Some((node[0].0, median(node.iter().map(|(_, found)| found))?)))
+        .collect();
     nodes.windows(2).map(|pair| (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1)).collect()
 }
 
