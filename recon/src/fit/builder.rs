@@ -3,12 +3,13 @@
 use glam::DVec3;
 
 use super::hanger::{Hanger, relative};
+use super::hidden::{self, Outline};
 use super::leaf::crowd::Crowd;
 use super::leaf::smeared::{self, Cloud};
 use super::leaf::{self, LeafFit};
 use super::stem::StemFit;
 use super::whole::Evidence;
-use super::{FitError, OrganFit, stem};
+use super::{FitError, OrganFit, stem, uncertainty};
 use crate::cloud::diagonal;
 use crate::model::kinematics::Similarity;
 use crate::model::{Form, Habit, Joint, Organ, OrganKind, PlantError, Species};
@@ -166,18 +167,36 @@ impl<'a> Builder<'a> {
 
     /// Fits blades again that are hardly larger than the noise; `count` tells the points of an organ of the tree.
     pub(super) fn sharpen(&mut self, count: impl Fn(usize) -> usize) {
-        let counts: Vec<usize> = self.fits.iter().map(|fit| fit.source.map_or(0, &count)).collect();
-        let each = |organ: usize| counts[organ] as f64 / self.evidence[organ].points.len().max(1) as f64;
-        let fits: Vec<_> = self.blades.iter().map(|hung| (&hung.fit, each(hung.organ))).collect();
+        let count = |fits: &[OrganFit], organ: usize| fits[organ].source.map_or(0, &count);
+        let each = |hung: &HungBlade| {
+            count(&self.fits, hung.organ) as f64 / self.evidence[hung.organ].points.len().max(1) as f64
+        };
+        let fits: Vec<_> = self.blades.iter().map(|hung| (&hung.fit, each(hung))).collect();
         let Some(crowd) = Crowd::of(&fits) else { return };
-        for HungBlade { organ, joint, fit } in &self.blades {
+        for HungBlade { organ, joint, fit } in &mut self.blades {
             let points = self.evidence[*organ].points;
-            let cloud = Cloud { points, count: counts[*organ], base: joint.translation, up: self.up };
-            if let Some(fit) = smeared::again(fit, cloud, self.species, crowd) {
-                let (old, said) = (&mut self.organs[*organ], &mut self.fits[*organ]);
-                *old = Organ { parent: old.parent, ..blade(old.joint.d, *joint, &fit) };
-                *said = OrganFit { source: said.source, points: said.points, ..outcome(&fit) };
-            }
+            let cloud = Cloud { points, count: count(&self.fits, *organ), base: joint.translation, up: self.up };
+            let Some(sharper) = smeared::again(fit, cloud, self.species, crowd) else { continue };
+            let (old, said) = (&mut self.organs[*organ], &mut self.fits[*organ]);
+            *old = Organ { parent: old.parent, ..blade(old.joint.d, *joint, &sharper) };
+            *said = OrganFit { source: said.source, points: said.points, ..outcome(&sharper) };
+            *fit = sharper;
+        }
+    }
+
+    /// Widens the uncertainties of blades that may be partly hidden, leaves being numbered; `count` as above.
+    pub(super) fn doubt(&mut self, count: impl Fn(usize) -> usize) {
+        let outline = |hung: &HungBlade| Outline {
+            points: self.fits[hung.organ].source.map_or(0, &count) as f64,
+            area: hung.fit.area,
+            leaf: match self.organs[hung.organ].form {
+                Form::Leaf { leaf, .. } => leaf,
+                Form::Stem { .. } => unreachable!("a blade is a leaf"),
+            },
+        };
+        let outlines: Vec<Outline> = self.blades.iter().map(outline).collect();
+        for (hung, share) in self.blades.iter().zip(hidden::shares(&outlines)) {
+            uncertainty::doubt(&mut self.fits[hung.organ].sigmas, share);
         }
     }
 }

@@ -8,6 +8,7 @@ mod builder;
 mod centreline;
 mod error;
 mod hanger;
+mod hidden;
 mod leaf;
 pub(crate) mod leaflets;
 mod lone;
@@ -16,6 +17,7 @@ mod orient;
 pub(crate) mod solver;
 mod stem;
 mod tube;
+mod uncertainty;
 mod whole;
 
 use builder::{Builder, Source};
@@ -46,7 +48,7 @@ pub struct OrganFit {
     pub visible_fraction: Option<f64>,
     /// The solver stopped because the cost no longer fell.
     pub converged: bool,
-    /// How sure its traits are; of stems none is known.
+    /// How sure its traits are.
     pub sigmas: Sigmas,
 }
 
@@ -85,8 +87,10 @@ pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, F
             parent
         }));
     }
-    builder.sharpen(|organ| tree.organs[organ].points.len());
+    let counts = |organ: usize| tree.organs[organ].points.len();
+    builder.sharpen(counts);
     leaflets::group(&mut builder.organs, species.habit);
+    builder.doubt(counts);
     let mut plant = Plant { world_from_plant, organs: builder.organs };
     let outcomes = whole::refine(&mut plant, &builder.evidence, species)?;
     plant.validate()?;

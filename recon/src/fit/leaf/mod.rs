@@ -65,6 +65,8 @@ pub(crate) struct LeafFit {
     pub sigmas: Sigmas,
     /// Standard deviation of the points about the surface, metres.
     noise: f64,
+    /// Square metres.
+    pub area: f64,
     /// What it holds inside its edges.
     inner: Count,
     state: State,
@@ -147,6 +149,7 @@ fn finish(
 /// A fit that ended at `state`, but for what the way there told.
 fn finished(state: State, seen: &Seen, data: &Data, species: &Species) -> LeafFit {
     let areas = &seen.sheet.areas;
+    let area = areas.iter().sum();
     let hidden: f64 = seen.gaps(data, BESIDE * data.spacing).map(|(n, _)| areas[n]).sum();
     let raw = species.leaf.points(&state.blade(), Lattice::WHOLE);
     LeafFit {
@@ -154,11 +157,12 @@ fn finished(state: State, seen: &Seen, data: &Data, species: &Species) -> LeafFi
         rotation: (state.rotation * gauge(&raw).inverse()).normalize(),
         length: state.metres(),
         residual: mean(seen.distances(data)).unwrap_or(0.0),
-        visible: 1.0 - hidden / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE),
+        visible: 1.0 - hidden / f64::max(area, f64::MIN_POSITIVE),
         blade: state.blade(),
         converged: false,
         sigmas: Sigmas::new(),
         noise: 0.0,
+        area,
         inner: Count::default(),
         state,
     }

@@ -50,8 +50,7 @@ pub(in crate::fit) struct Cloud<'a> {
 pub(in crate::fit) fn again(fit: &LeafFit, cloud: Cloud<'_>, species: &Species, crowd: Crowd) -> Option<LeafFit> {
     let step = |lattice: &Lattice| fit.length / (lattice.rows() - 1) as f64;
     let lattice = LATTICES.into_iter().find(|lattice| step(lattice) <= STEP * crowd.noise)?;
-    let area: f64 = fit.state.sheet(species, lattice).areas.iter().sum();
-    if area.sqrt() > SMALL * crowd.noise {
+    if fit.area.sqrt() > SMALL * crowd.noise {
         return None;
     }
     let data = Data::thinned(cloud.points, MAX_POINTS);
