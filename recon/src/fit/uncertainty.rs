@@ -20,10 +20,10 @@ const BIAS: [(&str, f64); 13] = [
     (keys::PETIOLE_ANGLE, 0.03),
     (keys::STEM_LEAN, 0.005),
 ];
-/// Standard deviation of a trait for each of its area that a blade may hide: shares of the value, of the inclination
+/// Standard deviation of a trait by the share of its area that a blade may hide: shares of the value, of the inclination
 /// radians. From grown plants with noise and points taken away (tools/helios, seeds 2000 to 2003).
 const HIDDEN: [(&str, f64); 4] =
-    [(keys::LEAF_AREA, 1.5), (keys::LEAF_LENGTH, 0.6), (keys::LEAF_WIDTH, 0.6), (keys::LEAF_INCLINATION, 0.15)];
+    [(keys::LEAF_AREA, 2.0), (keys::LEAF_LENGTH, 0.6), (keys::LEAF_WIDTH, 0.6), (keys::LEAF_INCLINATION, 0.15)];
 /// Factor on the covariance for what its linear form leaves out: starts in a wrong valley, wrong neighbours.
 const INFLATION: f64 = 3.0;
 
