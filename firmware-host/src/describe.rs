@@ -1,11 +1,11 @@
-//! From a fitted plant to what is kept and told of it: its compact record, and the report of the plant that decodes
-//! from that record, never of the raw fit.
+//! From a fitted plant to what is kept and told of it: its record, and the report of the plant that decodes from that
+//! record, never of the raw fit.
 
 use demeter_recon::fit::{Fitted, OrganFit};
 use demeter_recon::metrics::chamfer;
 use demeter_recon::model::{Detail, Form, Knots, Plant, PlantMesh, Species, forward};
 use demeter_recon::organs::ScaleSource;
-use demeter_recon::record::{decode, encode_compact};
+use demeter_recon::record::{RecordError, decode, encode_compact, encode_exact};
 use demeter_recon::traits::PlantTraits;
 use glam::DVec3;
 
@@ -14,7 +14,7 @@ use crate::report::{OrganReport, PlantReport};
 
 /// A fitted plant, encoded, decoded and measured.
 pub struct Described {
-    /// The compact record.
+    /// The record.
     pub record: Vec<u8>,
     /// The plant that the record holds.
     pub plant: Plant,
@@ -22,6 +22,37 @@ pub struct Described {
     pub mesh: PlantMesh,
     /// What is told of it.
     pub report: PlantReport,
+}
+
+/// How a record is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Quantised and entropy-coded.
+    Compact,
+    /// All that the plant holds, to f32.
+    Exact,
+}
+
+impl Encoding {
+    /// A plant's record, and the plant that it holds: what is told of a record is told of that one.
+    ///
+    /// # Errors
+    /// [`CommandError`] `record` when the plant has no record.
+    pub fn write(
+        self,
+        plant: &Plant,
+        species: &Species,
+        scale_source: ScaleSource,
+    ) -> Result<(Vec<u8>, Plant), CommandError> {
+        let failed = |error: RecordError| CommandError::failed("record", &error);
+        let encode = match self {
+            Self::Compact => encode_compact,
+            Self::Exact => encode_exact,
+        };
+        let bytes = encode(plant, species, scale_source).map_err(failed)?;
+        let plant = decode(&bytes, |_| Some(species)).map_err(failed)?.plant;
+        Ok((bytes, plant))
+    }
 }
 
 /// Encodes a fitted plant, decodes it again and reports on what came back. `cloud` holds the points it was fitted
@@ -34,11 +65,10 @@ pub fn describe(
     species: &Species,
     cloud: &[DVec3],
     scale_source: ScaleSource,
+    encoding: Encoding,
 ) -> Result<Described, CommandError> {
-    let failed = |error: &dyn std::error::Error| CommandError::failed("record", error);
-    let record = encode_compact(&fitted.plant, species, scale_source).map_err(|error| failed(&error))?;
-    let plant = decode(&record, |_| Some(species)).map_err(|error| failed(&error))?.plant;
-    let posed = forward(&plant, species).map_err(|error| failed(&error))?;
+    let (record, plant) = encoding.write(&fitted.plant, species, scale_source)?;
+    let posed = forward(&plant, species).map_err(|error| CommandError::failed("record", &error))?;
     let mesh = PlantMesh::of(&posed, Detail::Control, Knots::Uniform);
     let mut report = report(&plant, species, record.len(), scale_source, &fitted.organs)?;
     report.cd = chamfer(cloud, &mesh).map(|chamfer| chamfer.cd);

@@ -1,6 +1,7 @@
 //! How a command ends.
 
 use std::fmt::{Display, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// The exit codes of the contract (spec/appliance.md "Command line").
@@ -52,6 +53,13 @@ impl CommandError {
     #[must_use]
     pub fn usage(kind: &'static str, message: impl Display) -> Self {
         Self { exit: Exit::BadUse, kind, message: message.to_string(), expected: None, found: None }
+    }
+
+    /// The same, the message naming the file it is about.
+    #[must_use]
+    pub fn of(mut self, file: &Path) -> Self {
+        self.message = format!("{}: {}", file.display(), self.message);
+        self
     }
 
     /// The same with what was expected and what was found.

@@ -5,7 +5,6 @@ use std::io::{Read, Write};
 use std::path::Path;
 
 use demeter_recon::model::{Plant, Species};
-use demeter_recon::organs::ScaleSource;
 use demeter_recon::record::{self, Record, RecordError};
 
 use crate::error::{CommandError, Exit};
@@ -68,12 +67,8 @@ pub fn write_mesh(path: &Path, plant: &Plant, species: &Species) -> Result<(), C
 /// refused.
 pub fn species(name: &str) -> Result<Species, CommandError> {
     if Path::new(name).extension().is_some_and(|extension| extension == "safetensors") {
-        let refused = |error| {
-            let mut refused = CommandError::failed("species", &error);
-            refused.message = format!("{name}: {}", refused.message);
-            refused
-        };
-        return Species::from_bytes(&read(Path::new(name))?).map_err(refused);
+        let file = Path::new(name);
+        return Species::from_bytes(&read(file)?).map_err(|error| CommandError::failed("species", &error).of(file));
     }
     let known = demeter_recon::species::NAMES.join(", ");
     let found = match name.strip_prefix("generic:") {
@@ -96,8 +91,7 @@ pub fn species(name: &str) -> Result<Species, CommandError> {
 /// [`CommandError`] naming the record, and the species file that it needs when another one is at hand.
 pub fn record(path: &Path, bytes: &[u8], species: Option<&str>) -> Result<(Record, Species), CommandError> {
     let refused = |error: RecordError| {
-        let mut refused = CommandError::failed("record", &error);
-        refused.message = format!("{}: {}", path.display(), refused.message);
+        let mut refused = CommandError::failed("record", &error).of(path);
         if let RecordError::Species { expected, found } = &error {
             refused.message += "; give the species file that it was written with by --species";
             return refused.with(expected, found);
@@ -116,24 +110,6 @@ pub fn record(path: &Path, bytes: &[u8], species: Option<&str>) -> Result<(Recor
         }
     };
     Ok((record::decode(bytes, |_| Some(&species)).map_err(refused)?, species))
-}
-
-/// What goes into a plant's record file, compact unless `exact`, and the plant that it holds: what is told of a record
-/// is told of that one.
-///
-/// # Errors
-/// [`CommandError`] `record` when the plant has no record.
-pub fn encode(
-    plant: &Plant,
-    species: &Species,
-    scale_source: ScaleSource,
-    exact: bool,
-) -> Result<(Vec<u8>, Plant), CommandError> {
-    let failed = |error: RecordError| CommandError::failed("record", &error);
-    let encode = if exact { record::encode_exact } else { record::encode_compact };
-    let bytes = encode(plant, species, scale_source).map_err(failed)?;
-    let plant = record::decode(&bytes, |_| Some(species)).map_err(failed)?.plant;
-    Ok((bytes, plant))
 }
 
 pub(crate) fn file_error(path: &Path, error: &std::io::Error) -> CommandError {

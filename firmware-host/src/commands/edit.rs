@@ -7,7 +7,7 @@ use demeter_recon::model::{Plant, PlantError, Species, forward};
 use demeter_recon::record::SpeciesRef;
 use glam::DVec3;
 
-use crate::describe::report;
+use super::target::Target;
 use crate::error::{CommandError, Exit};
 use crate::files;
 use crate::output::Output;
@@ -41,15 +41,8 @@ pub struct Args {
     /// Cut an organ off with all that hangs on it. Repeatable.
     #[arg(long, value_name = "ORGAN")]
     cut: Vec<usize>,
-    /// Where the record goes.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Write the exact encoding instead of the compact one.
-    #[arg(long)]
-    exact: bool,
-    /// Also write the plant's surface: .ply, .obj or .glb.
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    #[command(flatten)]
+    target: Target,
     /// Also write a picture of the plant before (left) and after: .png.
     #[arg(long)]
     picture: Option<PathBuf>,
@@ -88,13 +81,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         plant = graft(&plant, *from, *onto, *d).map_err(refused)?;
     }
     plant = cut(&plant, &args.cut).map_err(refused)?;
-    let (bytes, plant) = files::encode(&plant, &species, record.scale_source, args.exact)?;
-    files::write(&args.output, &bytes)?;
-    if let Some(path) = &args.mesh {
-        files::write_mesh(path, &plant, &species)?;
-    }
-    let mut report = report(&plant, &species, bytes.len(), record.scale_source, &[])?;
-    report.record = Some(args.output.display().to_string());
+    let (plant, report) = args.target.keep(&plant, &species, record.scale_source)?;
     if let Some(path) = &args.picture {
         let pair = beside(record.plant, plant, &species).map_err(|error| CommandError::failed("edit", &error))?;
         let pair = pair.into_iter().map(|plant| (&species, plant)).collect();

@@ -8,11 +8,11 @@ use demeter_recon::cloud::{PointCloud, PointOrgan};
 use demeter_recon::export::cloud_to_ply;
 use demeter_recon::model::OrganKind;
 use demeter_recon::organs::{OrganTree, ScaleSource};
-use demeter_recon::record::encode_exact;
 use demeter_recon::segment::{Labels, Up, segment};
 use demeter_recon::{fit, tree};
 use glam::DVec3;
 
+use super::target::Target;
 use crate::describe::describe;
 use crate::error::{CommandError, Exit};
 use crate::files;
@@ -38,15 +38,8 @@ pub struct Args {
     /// The cloud's vertical axis.
     #[arg(long, value_enum, default_value_t)]
     up: Axis,
-    /// Where the record goes.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Write the exact encoding instead of the compact one.
-    #[arg(long)]
-    exact: bool,
-    /// Also write the plant's surface: .ply, .obj or .glb.
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    #[command(flatten)]
+    target: Target,
     /// Also write the input points, in order, with `organ` and `kind`; `fit` takes the file as organs already apart.
     #[arg(long)]
     points: Option<PathBuf>,
@@ -105,22 +98,12 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let segmented = segment(&cloud, species.habit, labels, up).map_err(|error| args.refused("segmentation", &error))?;
     let tree = tree::build(segmented.organs).map_err(|error| args.refused("topology", &error))?;
     let fitted = fit::plant(&tree, &species, segmented.up).map_err(|error| args.refused("fit", &error))?;
-    let mut described = describe(&fitted, &species, &cloud.points, ScaleSource::Input)?;
-    let record = if args.exact {
-        encode_exact(&fitted.plant, &species, ScaleSource::Input)
-            .map_err(|error| CommandError::failed("record", &error))?
-    } else {
-        described.record
-    };
-    files::write(&args.output, &record)?;
-    if let Some(path) = &args.mesh {
-        files::write_mesh(path, &described.plant, &species)?;
-    }
+    let mut described = describe(&fitted, &species, &cloud.points, ScaleSource::Input, args.target.encoding())?;
+    args.target.write(&described.record, &described.plant, &species, &mut described.report)?;
     if let Some(path) = &args.points {
         cloud.organs = Some(point_organs(cloud.points.len(), &tree, &fitted));
         files::write(path, &cloud_to_ply(&cloud))?;
     }
-    described.report.record = Some(args.output.display().to_string());
     described.report.ms = Some(started.elapsed().as_secs_f64() * 1e3);
     let plants = vec![described.report];
     output.plants(&Document { plants, warnings: Vec::new(), seconds: Some(started.elapsed().as_secs_f64()) })?;
@@ -129,9 +112,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
 
 impl Args {
     fn refused(&self, kind: &'static str, error: &dyn std::error::Error) -> CommandError {
-        let mut refused = CommandError::failed(kind, error);
-        refused.message = format!("{}: {}", self.cloud.display(), refused.message);
-        refused
+        CommandError::failed(kind, error).of(&self.cloud)
     }
 }
 

@@ -7,7 +7,7 @@ use demeter_recon::model::{PosedPlant, forward};
 use demeter_recon::organs::ScaleSource;
 use glam::DVec3;
 
-use crate::describe::report;
+use super::target::Target;
 use crate::error::{CommandError, Exit};
 use crate::files;
 use crate::output::Output;
@@ -24,15 +24,8 @@ pub struct Args {
     /// Species to hold the plant in: best one from `demeter species import`.
     #[arg(long)]
     species: String,
-    /// Where the record goes.
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Write the exact encoding instead of the compact one.
-    #[arg(long)]
-    exact: bool,
-    /// Also write the plant's surface: .ply, .obj or .glb.
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    #[command(flatten)]
+    target: Target,
 }
 
 /// Reads the plant, projects it on the species and writes the record; a warning says how far that moved its points.
@@ -47,15 +40,9 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let parts = read(&args.plant, PLANT_FILES)?;
     let plant = ReleasePlant::read([&parts[0], &parts[1], &parts[2]]).map_err(|error| refused(&args.plant, &error))?;
     let raw = RawPlant::of(&plant, &bases);
-    let (record, projected) = files::encode(&raw.project(&species), &species, ScaleSource::Input, args.exact)?;
-    files::write(&args.output, &record)?;
-    if let Some(path) = &args.mesh {
-        files::write_mesh(path, &projected, &species)?;
-    }
+    let (projected, mut report) = args.target.keep(&raw.project(&species), &species, ScaleSource::Input)?;
     let before = raw.pose().map_err(|error| failed(&error))?;
     let after = forward(&projected, &species).map_err(|error| failed(&error))?;
-    let mut report = report(&projected, &species, record.len(), ScaleSource::Input, &[])?;
-    report.record = Some(args.output.display().to_string());
     report.warnings.push(format!(
         "control points moved by {:.2} % of the plant's diagonal on average, for its angles do not all lie in the species' basis",
         100.0 * moved(&before, &after)
@@ -89,7 +76,5 @@ fn read(folder: &Path, names: [&str; 3]) -> Result<Vec<Vec<u8>>, CommandError> {
 }
 
 fn refused(folder: &Path, error: &ReleaseError) -> CommandError {
-    let mut refused = CommandError::failed("release", error);
-    refused.message = format!("{}: {}", folder.display(), refused.message);
-    refused
+    CommandError::failed("release", error).of(folder)
 }

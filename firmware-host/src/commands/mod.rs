@@ -13,3 +13,4 @@ pub mod replay;
 pub mod run;
 pub mod species;
 pub mod synth;
+mod target;

@@ -10,7 +10,7 @@ use demeter_recon::model::{Plant, Species};
 use demeter_recon::organs::ScaleSource;
 use glam::DVec3;
 
-use crate::describe::{Described, describe};
+use crate::describe::{Described, Encoding, describe};
 use crate::error::{CommandError, Exit, chain};
 use crate::eye::{Eye, PlantSight};
 use crate::files;
@@ -121,7 +121,7 @@ fn fit(sight: PlantSight, species: &Species, camera: &Intrinsics) -> Result<Fitt
     let camera_from_plant = std::mem::replace(&mut fitted.plant.world_from_plant, Pose::IDENTITY);
     let plant_from_camera = camera_from_plant.inverse();
     cloud.iter_mut().for_each(|p| *p = plant_from_camera.point(*p));
-    let mut described = describe(&fitted, species, &cloud, ScaleSource::None)?;
+    let mut described = describe(&fitted, species, &cloud, ScaleSource::None, Encoding::Compact)?;
     described.report.camera = Some(Camera { intrinsics: *camera, camera_from_plant });
     let in_camera = Plant { world_from_plant: camera_from_plant, ..described.plant.clone() };
     let warnings = &mut described.report.warnings;

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::looker::{BestView, Found, FrameKey};
 use super::{Outcome, Progress, Run};
-use crate::describe::describe;
+use crate::describe::{Encoding, describe};
 use crate::error::chain;
 use crate::eye::Eye;
 use crate::picture;
@@ -94,7 +94,7 @@ impl Keeper<'_> {
     fn new_plant(&self, closed: &Closed<FrameKey, BestView>, id: String) -> Result<NewPlant, ReconstructError> {
         let (best, species) = (&closed.best, self.run.species);
         let (fitted, cloud) = fit_organs(best.organs.clone(), species, glam::DVec3::Z)?;
-        let mut made = describe(&fitted, species, &cloud, best.scale_source)?;
+        let mut made = describe(&fitted, species, &cloud, best.scale_source, Encoding::Compact)?;
         made.report.id = Some(id);
         if best.stand_in {
             made.report.warnings.push("no main stem was seen: one was put through the leaves' bases".into());

@@ -8,22 +8,16 @@ use demeter_recon::organs::{OrganTree, ScaleSource};
 use demeter_recon::segment::{Labels, Up, segment};
 use demeter_recon::{fit, species, tree};
 
-use crate::describe::{Described, describe};
+use crate::describe::{Described, Encoding, describe};
 use crate::error::CommandError;
 use crate::files;
 
 /// Reads a cloud whose unit is `metres` long.
 pub(super) fn read(path: &Path, metres: f64) -> Result<PointCloud, CommandError> {
-    let mut cloud = PointCloud::from_ply(&files::read(path)?).map_err(|error| named(path, "ply", &error))?;
+    let mut cloud =
+        PointCloud::from_ply(&files::read(path)?).map_err(|error| CommandError::failed("ply", &error).of(path))?;
     cloud.points.iter_mut().for_each(|p| *p *= metres);
     Ok(cloud)
-}
-
-/// An error that names its file.
-pub(super) fn named(path: &Path, kind: &'static str, error: &dyn std::error::Error) -> CommandError {
-    let mut named = CommandError::failed(kind, error);
-    named.message = format!("{}: {}", path.display(), named.message);
-    named
 }
 
 /// The shipped species whose name begins the file's name, else its folder's.
@@ -55,7 +49,7 @@ pub(super) fn whole(cloud: &PointCloud, species: &Species, labels: Labels, up: U
     let tree = tree::build(segmented.organs).map_err(|error| failed("topology", &error))?;
     let fitted = fit::plant(&tree, species, segmented.up).map_err(|error| failed("fit", &error))?;
     let source = fitted.organs.iter().map(|organ| organ.source).collect();
-    let described = describe(&fitted, species, &cloud.points, ScaleSource::Input)?;
+    let described = describe(&fitted, species, &cloud.points, ScaleSource::Input, Encoding::Compact)?;
     Ok(Fitted { tree, source, described })
 }
 

@@ -9,7 +9,7 @@ use demeter_recon::segment::{Labels, Up, segment};
 use demeter_recon::{species, tree};
 use glam::DVec3;
 
-use super::clouds::{named, read};
+use super::clouds::read;
 use super::table::{Cell, Table};
 use super::truth::Truth;
 use super::{files_of, folder, progress};
@@ -43,9 +43,9 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
         let species = files::species(&truth.species)?;
         let cloud = read(&cloud_path, 1.0)?;
         let organs = segment(&cloud, species.habit, Labels::Auto, Up::Axis(DVec3::Z))
-            .map_err(|error| named(&cloud_path, "segmentation", &error))?
+            .map_err(|error| CommandError::failed("segmentation", &error).of(&cloud_path))?
             .organs;
-        let tree = tree::build(organs).map_err(|error| named(&cloud_path, "topology", &error))?;
+        let tree = tree::build(organs).map_err(|error| CommandError::failed("topology", &error).of(&cloud_path))?;
         let Some(organ_of_point) = &cloud.organs else {
             let message = format!("{}: expected the properties `organ` and `kind`, found none", cloud_path.display());
             return Err(CommandError::usage("truth", message));

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::clouds::named;
 use crate::error::CommandError;
 use crate::files;
 
@@ -63,7 +62,8 @@ pub(super) enum Kind {
 impl Truth {
     /// Reads the truth of `path` (.json) and says where its cloud is.
     pub(super) fn read(path: &Path) -> Result<(Self, PathBuf), CommandError> {
-        let truth: Self = serde_json::from_slice(&files::read(path)?).map_err(|error| named(path, "truth", &error))?;
+        let truth: Self = serde_json::from_slice(&files::read(path)?)
+            .map_err(|error| CommandError::failed("truth", &error).of(path))?;
         for (id, organ) in truth.organs.iter().enumerate() {
             let known = organ.parent.is_none_or(|parent| truth.organs.get(parent as usize).is_some());
             if organ.id as usize != id || !known {
