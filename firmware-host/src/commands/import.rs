@@ -37,8 +37,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let species = files::species(&args.species)?;
     let around = args.plant.join("..");
     let bases = bases(args.release.as_ref().unwrap_or(&around))?;
-    let parts = read(&args.plant, PLANT_FILES)?;
-    let plant = ReleasePlant::read([&parts[0], &parts[1], &parts[2]]).map_err(|error| refused(&args.plant, &error))?;
+    let plant = release_plant(&args.plant)?;
     let raw = RawPlant::of(&plant, &bases);
     let (projected, mut report) = args.target.keep(&raw.project(&species), &species, ScaleSource::Input)?;
     let before = raw.pose().map_err(|error| failed(&error))?;
@@ -67,14 +66,18 @@ fn moved(before: &PosedPlant, after: &PosedPlant) -> f64 {
 /// # Errors
 /// [`CommandError`] naming the file.
 pub(super) fn bases(folder: &Path) -> Result<Bases, CommandError> {
-    let parts = read(folder, FILES)?;
-    Bases::read([&parts[0], &parts[1], &parts[2]]).map_err(|error| refused(folder, &error))
+    read(folder, FILES, Bases::read)
 }
 
-fn read(folder: &Path, names: [&str; 3]) -> Result<Vec<Vec<u8>>, CommandError> {
-    names.iter().map(|name| files::read(&folder.join(name))).collect()
+/// The plant in a folder of the release.
+///
+/// # Errors
+/// [`CommandError`] naming the file.
+pub(super) fn release_plant(folder: &Path) -> Result<ReleasePlant, CommandError> {
+    read(folder, PLANT_FILES, ReleasePlant::read)
 }
 
-fn refused(folder: &Path, error: &ReleaseError) -> CommandError {
-    CommandError::failed("release", error).of(folder)
+fn read<T>(folder: &Path, names: [&str; 3], of: fn([&[u8]; 3]) -> Result<T, ReleaseError>) -> Result<T, CommandError> {
+    let [a, b, c] = names.map(|name| files::read(&folder.join(name)));
+    of([&a?, &b?, &c?]).map_err(|error| CommandError::failed("release", &error).of(folder))
 }
