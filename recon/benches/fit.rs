@@ -4,22 +4,43 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use demeter_recon::cloud::PointCloud;
+use demeter_recon::edit::{cut, graft};
 use demeter_recon::metrics::chamfer;
-use demeter_recon::model::{Detail, Habit, Knots, PlantMesh, Species, forward};
+use demeter_recon::model::{Detail, Knots, Plant, PlantMesh, Species, forward};
 use demeter_recon::organs::{OrganTree, ScaleSource};
 use demeter_recon::record::encode_compact;
 use demeter_recon::segment::{Labels, Up, segment};
 use demeter_recon::world::{grow, labelled_cloud, seeded};
 use demeter_recon::{fit, species, tree};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
-fn cloud(species: &Species, age: f64, points: usize) -> PointCloud {
-    let plant = grow(species, age, &mut seeded(1));
-    labelled_cloud(&plant, species, points, 0.001, &mut seeded(2)).unwrap().cloud
+/// Turn from one leaf to the next around the main stem, radians: the golden angle.
+const PHYLLOTAXIS: f64 = 2.4;
+
+fn cloud(plant: &Plant, species: &Species, points: usize) -> PointCloud {
+    labelled_cloud(plant, species, points, 0.001, &mut seeded(2)).unwrap().cloud
 }
 
-fn organ_tree(cloud: &PointCloud, habit: Habit) -> OrganTree {
-    tree::build(segment(cloud, habit, Labels::Own, Up::Axis(DVec3::Z)).unwrap().organs).unwrap()
+/// A soybean of at least so many organs: one leaf of a plant, again and again around its main stem.
+fn with_organs(species: &Species, organs: usize) -> Plant {
+    let grown = grow(species, 0.4, &mut seeded(1));
+    let leaf = (1..grown.organs.len()).find(|i| grown.organs[*i].parent == Some(0)).unwrap();
+    let others: Vec<usize> =
+        (1..grown.organs.len()).filter(|i| *i != leaf && grown.organs[*i].parent == Some(0)).collect();
+    let mut plant = cut(&grown, &others).unwrap();
+    let leaf_organs = plant.organs.len() - 1;
+    let copies = organs.saturating_sub(plant.organs.len()).div_ceil(leaf_organs);
+    for k in 1..=copies {
+        let root = plant.organs.len();
+        plant = graft(&plant, 1, 0, k as f64 / (copies + 1) as f64).unwrap();
+        let joint = &mut plant.organs[root].joint;
+        joint.rotation = DQuat::from_rotation_y(PHYLLOTAXIS * k as f64) * joint.rotation;
+    }
+    plant
+}
+
+fn organ_tree(cloud: &PointCloud, species: &Species) -> OrganTree {
+    tree::build(segment(cloud, species, Labels::Own, Up::Axis(DVec3::Z)).unwrap().organs).unwrap()
 }
 
 fn by_points(c: &mut Criterion) {
@@ -27,10 +48,10 @@ fn by_points(c: &mut Criterion) {
     let mut group = c.benchmark_group("points");
     group.sample_size(10);
     for points in [5_000, 50_000, 500_000] {
-        let cloud = cloud(&maize, 0.5, points);
-        let tree = organ_tree(&cloud, maize.habit);
+        let cloud = cloud(&grow(&maize, 0.5, &mut seeded(1)), &maize, points);
+        let tree = organ_tree(&cloud, &maize);
         group.bench_with_input(BenchmarkId::new("segment", points), &cloud, |b, cloud| {
-            b.iter(|| segment(cloud, maize.habit, Labels::Own, Up::Axis(DVec3::Z)).unwrap());
+            b.iter(|| segment(cloud, &maize, Labels::Own, Up::Axis(DVec3::Z)).unwrap());
         });
         group.bench_with_input(BenchmarkId::new("fit", points), &tree, |b, tree| {
             b.iter(|| fit::plant(tree, &maize, DVec3::Z).unwrap());
@@ -48,9 +69,9 @@ fn by_organs(c: &mut Criterion) {
     let soybean = species::shipped("soybean").unwrap().unwrap();
     let mut group = c.benchmark_group("organs");
     group.sample_size(10);
-    for age in [0.1, 0.4, 1.0] {
-        let cloud = cloud(&soybean, age, 50_000);
-        let tree = organ_tree(&cloud, soybean.habit);
+    for organs in [10, 20, 50, 100, 200] {
+        let cloud = cloud(&with_organs(&soybean, organs), &soybean, 50_000);
+        let tree = organ_tree(&cloud, &soybean);
         let plant = fit::plant(&tree, &soybean, DVec3::Z).unwrap().plant;
         let organs = plant.organs.len();
         group.bench_with_input(BenchmarkId::new("forward", organs), &plant, |b, plant| {

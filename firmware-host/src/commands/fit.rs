@@ -95,7 +95,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         LabelSource::Label => Labels::Own,
         LabelSource::None => Labels::None,
     };
-    let segmented = segment(&cloud, species.habit, labels, up).map_err(|error| args.refused("segmentation", &error))?;
+    let segmented = segment(&cloud, &species, labels, up).map_err(|error| args.refused("segmentation", &error))?;
     let tree = tree::build(segmented.organs).map_err(|error| args.refused("topology", &error))?;
     let fitted = fit::plant(&tree, &species, segmented.up).map_err(|error| args.refused("fit", &error))?;
     let mut described = describe(&fitted, &species, &cloud.points, ScaleSource::Input, args.target.encoding())?;

@@ -3,10 +3,10 @@
 
 use glam::DVec3;
 
-use super::{MIN_ORGAN_POINTS, blades, grain, nearest_to, organ, stems};
+use super::{MIN_ORGAN_POINTS, blades, grain, nearest_to, organ, parting, stems};
 use crate::axes::PrincipalAxes;
 use crate::graph::pieces;
-use crate::model::{Habit, OrganKind};
+use crate::model::{OrganKind, Species};
 use crate::nearest::{Nearest, Neighbour};
 use crate::organs::OrganCloud;
 
@@ -32,7 +32,7 @@ const PATCH_SHARE: f64 = 0.2;
 /// Neighbours whose votes smooth the classes.
 const VOTERS: usize = 15;
 
-pub(super) fn segment(points: &[DVec3], foot: DVec3, habit: Habit) -> Vec<OrganCloud> {
+pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3, species: &Species) -> Vec<OrganCloud> {
     let search = Nearest::of(points);
     let grain = grain(points, &search, 10);
     let radius = (SCALE_SHARE * crate::cloud::diagonal(points).unwrap_or(0.0)).max(2.0 * grain);
@@ -81,7 +81,8 @@ pub(super) fn segment(points: &[DVec3], foot: DVec3, habit: Habit) -> Vec<OrganC
     blades.extend(balls);
     let stems: Vec<usize> = (0..points.len()).filter(|i| is_stem[*i]).collect();
     let (blades, stems) = adopt(points, blades, stems, crumbs.concat());
-    let mut organs = stems::split(points, &stems, &blades, foot, habit);
+    let blades = parting::part(points, blades, up, species);
+    let mut organs = stems::split(points, &stems, &blades, foot, species.habit);
     organs.extend(blades.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
     organs
 }

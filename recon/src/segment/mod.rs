@@ -1,12 +1,14 @@
 //! Clouds to organs (spec/reconstruction.md "Points to organs"): by labels where there are any, else by geometry.
 
 mod apart;
+mod beside;
 mod blades;
 mod broadleaf;
 mod foot;
 mod grass;
 mod labelled;
 mod lattice;
+mod parting;
 mod stems;
 mod up;
 
@@ -14,7 +16,7 @@ use glam::DVec3;
 
 use crate::cloud::{PointCloud, diagonal};
 use crate::fit;
-use crate::model::{Habit, OrganKind};
+use crate::model::{Habit, OrganKind, Species};
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
 use crate::statistics::median;
@@ -82,7 +84,7 @@ pub struct Segmented {
 /// # Errors
 /// [`SegmentError`] when the cloud is too small, not finite, or lacks labels that were asked for,
 /// or when a given organ is of several kinds.
-pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Result<Segmented, SegmentError> {
+pub fn segment(cloud: &PointCloud, species: &Species, labels: Labels, up: Up) -> Result<Segmented, SegmentError> {
     let found = cloud.points.len();
     if found < MIN_POINTS {
         return Err(SegmentError::Points { expected: MIN_POINTS, found });
@@ -94,14 +96,13 @@ pub fn segment(cloud: &PointCloud, habit: Habit, labels: Labels, up: Up) -> Resu
     }
     match (labels, &cloud.organs, &cloud.labels) {
         (Labels::Auto, Some(organs), _) => apart::segment(&cloud.points, organs, up),
-        (Labels::Auto | Labels::Own, _, Some(own)) => Ok(labelled::segment(&cloud.points, own, habit, up)),
+        (Labels::Auto | Labels::Own, _, Some(own)) => Ok(labelled::segment(&cloud.points, own, species.habit, up)),
         (Labels::Own, _, None) => Err(SegmentError::Labels { found: "none" }),
         (Labels::None, _, _) | (Labels::Auto, None, None) => {
             let (up, foot) = up.resolve(&cloud.points, None);
-
-            let organs = match habit {
+            let organs = match species.habit {
                 Habit::Grass => grass::segment(&cloud.points, foot.point, up),
-                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, foot.point, habit),
+                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, foot.point, up, species),
             };
             Ok(Segmented { organs: organs.into_iter().filter(is_fittable).collect(), up })
         }

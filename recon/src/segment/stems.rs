@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::beside::Track;
 use super::lattice::one_a_cell;
 use super::{grain, nearest_to, organ};
 use crate::graph::{CloudGraph, Skeleton};
@@ -54,10 +55,13 @@ pub(super) fn split(
         })
         .collect();
     let division = Division::of(&own, skeleton, &hangs, LEAST * grain, habit);
+    let mut owner: Vec<usize> = node_of.iter().map(|node| division.organ_of[*node]).collect();
+    for track in division.tracks() {
+        track.follow(&own, &search, grain, &mut owner);
+    }
     let mut divided = vec![Vec::new(); division.organs];
     for (p, i) in all.iter().zip(members) {
-        let node = search.one(*p).map_or(0, |n| node_of[n.index]);
-        divided[division.organ_of[node]].push(*i);
+        divided[search.one(*p).map_or(0, |n| owner[n.index])].push(*i);
     }
     let kind = |k: usize| if k == 0 { OrganKind::MainStem } else { OrganKind::Stem };
     divided.into_iter().enumerate().map(|(k, members)| organ(points, kind(k), members)).collect()
@@ -204,6 +208,22 @@ impl Division {
         let best = branches.iter().copied().max_by(better)?;
         let carries_several = self.leaves[best] > 1 || (organ != 0 && self.leaves[k] <= 1);
         (branches.len() == 1 || carries_several || turn(best) > STRAIGHT).then_some(best)
+    }
+
+    /// Where each stem but the main stem is alone for the first time, the farthest from the foot first.
+    fn tracks(&self) -> Vec<Track> {
+        let centre = |k: usize| self.skeleton.centres[k];
+        let track = |start: usize| {
+            let (organ, before) = (self.organ_of[start], self.skeleton.parent[start]?);
+            let own = |k: usize| self.children[k].iter().copied().find(|c| self.organ_of[*c] == organ).unwrap_or(k);
+            let ahead = (0..AHEAD).fold(start, |k, _| own(k));
+            let way = (centre(start) - centre(ahead)).try_normalize()?;
+            Some(Track { organ, carrier: self.organ_of[before], at: centre(start), way })
+        };
+        let is_start = |k: &usize| self.skeleton.parent[*k].is_some_and(|p| self.organ_of[p] != self.organ_of[*k]);
+        let mut starts: Vec<usize> = (0..self.children.len()).filter(is_start).collect();
+        starts.sort_by(|a, b| self.skeleton.distance[*b].total_cmp(&self.skeleton.distance[*a]));
+        starts.into_iter().filter_map(track).collect()
     }
 
     /// The node `steps` below.

@@ -31,7 +31,7 @@ fn fitted(name: &str, age: f64, seed: u64, noise: f64) -> (Figures, Figures, f64
     let mut rng = seeded(seed);
     let grown = grow(&species, age, &mut rng);
     let cloud = labelled_cloud(&grown, &species, 20_000, noise, &mut rng).unwrap().cloud;
-    let segmented = segment(&cloud, species.habit, Labels::Own, Up::Axis(DVec3::Z)).unwrap();
+    let segmented = segment(&cloud, &species, Labels::Own, Up::Axis(DVec3::Z)).unwrap();
     let tree = tree::build(segmented.organs).unwrap();
     let plant = fit::plant(&tree, &species, segmented.up).unwrap().plant;
     let (found, mesh) = figures(&plant, &species);

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 /// The whole geometric line; `None` for a typed reason.
 fn plant_of(cloud: &PointCloud, species: &Species, up: Up) -> Option<Plant> {
-    let segmented = segment(cloud, species.habit, Labels::Auto, up).ok()?;
+    let segmented = segment(cloud, species, Labels::Auto, up).ok()?;
     let given: usize = segmented.organs.iter().map(|o| o.points.len()).sum();
     assert!(given <= cloud.points.len(), "no point may be in two organs");
     let tree = tree::build(segmented.organs).ok()?;

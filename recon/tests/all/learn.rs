@@ -13,7 +13,7 @@ fn lesson(grown_from: &Species, rich: &Species, seed: u64) -> (Lesson, usize) {
     let mut random = seeded(seed);
     let plant = grow(grown_from, 0.3, &mut random);
     let cloud = labelled_cloud(&plant, grown_from, 12_000, 0.0, &mut random).unwrap().cloud;
-    let organs = segment(&cloud, rich.habit, Labels::Own, Up::Axis(DVec3::Z)).unwrap().organs;
+    let organs = segment(&cloud, rich, Labels::Own, Up::Axis(DVec3::Z)).unwrap().organs;
     let blades = plant.organs.iter().filter(|o| matches!(o.form, Form::Leaf { .. })).count();
     (Lesson::of_plant(organs, DVec3::Z, rich).unwrap(), blades)
 }

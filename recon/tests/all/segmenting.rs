@@ -24,7 +24,7 @@ fn apart(plant: &Plant, made: &LabelledCloud) -> PointCloud {
 }
 
 fn divided(cloud: &PointCloud, species: &Species, labels: Labels, up: Up) -> Segmented {
-    segment(cloud, species.habit, labels, up).unwrap()
+    segment(cloud, species, labels, up).unwrap()
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn organs_apart_stay_as_they_are() {
         wrong.organs.as_mut().unwrap()[0].kind = OrganKind::Stem;
         wrong.organs.as_mut().unwrap()[1] = PointOrgan { kind: OrganKind::Leaf, ..wrong.organs.as_ref().unwrap()[0] };
         let number = wrong.organs.as_ref().unwrap()[0].organ;
-        let refused = segment(&wrong, species.habit, Labels::Auto, Up::Axis(DVec3::Z));
+        let refused = segment(&wrong, &species, Labels::Auto, Up::Axis(DVec3::Z));
         assert_eq!(refused, Err(SegmentError::Kinds { organ: number }));
     }
 }

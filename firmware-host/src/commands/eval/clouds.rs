@@ -45,7 +45,7 @@ pub(super) struct Fitted {
 /// The reason in words, for the table's notes: a plant that cannot be fitted does not stop the others.
 pub(super) fn whole(cloud: &PointCloud, species: &Species, labels: Labels, up: Up) -> Result<Fitted, CommandError> {
     let failed = |kind: &'static str, error: &dyn std::error::Error| CommandError::failed(kind, error);
-    let segmented = segment(cloud, species.habit, labels, up).map_err(|error| failed("segmentation", &error))?;
+    let segmented = segment(cloud, species, labels, up).map_err(|error| failed("segmentation", &error))?;
     let tree = tree::build(segmented.organs).map_err(|error| failed("topology", &error))?;
     let fitted = fit::plant(&tree, species, segmented.up).map_err(|error| failed("fit", &error))?;
     let source = fitted.organs.iter().map(|organ| organ.source).collect();

@@ -74,7 +74,7 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
         bar.inc(1);
         let Some(name) = species_of(&path) else { continue };
         let species = files::species(name)?;
-        let segmented = match segment(&read(&path, 1e-3)?, species.habit, Labels::Own, Up::Auto) {
+        let segmented = match segment(&read(&path, 1e-3)?, &species, Labels::Own, Up::Auto) {
             Ok(segmented) => segmented,
             Err(reason) => {
                 table.notes.push(format!("{}: {reason}", path.display()));

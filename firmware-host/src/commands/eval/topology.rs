@@ -89,8 +89,8 @@ fn grown(folder: &PathBuf, cases: &mut Vec<Case>) -> Result<(), CommandError> {
             continue;
         }
         let cloud = read(&cloud_path, 1.0)?;
-        let habit = files::species(&truth.species)?.habit;
-        let organs = segment(&cloud, habit, Labels::Auto, Up::Axis(DVec3::Z))
+        let species = files::species(&truth.species)?;
+        let organs = segment(&cloud, &species, Labels::Auto, Up::Axis(DVec3::Z))
             .map_err(|error| CommandError::failed("segmentation", &error).of(&cloud_path))?
             .organs;
         let Some(organ_of_point) = &cloud.organs else {

@@ -59,7 +59,7 @@ fn lesson(path: &Path, rich: &Species) -> Result<Result<Lesson, String>, Command
             return Lesson::of_leaf(&cloud.points, DVec3::Z, rich).map_err(|error| chain(&error));
         }
         let up = Up::Axis(DVec3::Z);
-        let organs = segment(&cloud, rich.habit, Labels::Auto, up).map_err(|error| chain(&error))?.organs;
+        let organs = segment(&cloud, rich, Labels::Auto, up).map_err(|error| chain(&error))?.organs;
         Lesson::of_plant(organs, DVec3::Z, rich).map_err(|error| chain(&error))
     }))
 }
@@ -68,7 +68,7 @@ fn lesson(path: &Path, rich: &Species) -> Result<Result<Lesson, String>, Command
 pub(super) fn plant_errors(path: &Path, species: &Species) -> Result<Vec<f64>, CommandError> {
     let up = Up::Axis(DVec3::Z);
     read(&files::read(path)?)
-        .and_then(|cloud| segment(&cloud, species.habit, Labels::Auto, up).map_err(|error| chain(&error)))
+        .and_then(|cloud| segment(&cloud, species, Labels::Auto, up).map_err(|error| chain(&error)))
         .and_then(|found| blade_errors(&found.organs, DVec3::Z, species).map_err(|error| chain(&error)))
         .map_err(|reason| CommandError {
             exit: Exit::Failed,
