@@ -243,3 +243,47 @@ impl Division {
         arriving.dot((self.skeleton.centres[ahead] - at).normalize_or_zero())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tube of 4 mm from one end to the other.
+    fn tube(from: DVec3, to: DVec3) -> impl Iterator<Item = DVec3> {
+        let along = (to - from).normalize();
+        let (x, y) = (along.any_orthonormal_vector(), along.cross(along.any_orthonormal_vector()));
+        let rings = (from.distance(to) / 0.001) as usize;
+        (0..=rings).flat_map(move |i| {
+            (0..8).map(move |k| {
+                let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 8.0).sin_cos();
+                from.lerp(to, i as f64 / rings as f64) + (x * cos + y * sin) * 0.002
+            })
+        })
+    }
+
+    #[test]
+    fn main_stems_go_on_where_side_stems_do_whatever_blades_touch() {
+        let up = |z: f64| DVec3::Z * z;
+        let petioles = [(0.1, DVec3::X), (0.2, DVec3::Y), (0.25, DVec3::NEG_Y)];
+        let mut points: Vec<DVec3> = tube(DVec3::ZERO, up(0.3)).collect();
+        points.extend(petioles.iter().flat_map(|(z, way)| tube(up(*z), up(z + 0.05) + *way * 0.15)));
+        let stems = points.len();
+        // The lowest petiole's own blade, and two that merely touch it.
+        let blade = |z: f64, way: DVec3, at: f64| {
+            let base = up(z + 0.05 * at) + way * (0.15 * at + 0.002);
+            (0..50).map(move |i| base + DVec3::new(way.x, way.y, 0.5) * (0.002 * f64::from(i)))
+        };
+        let hung = petioles.map(|(z, way)| (z, way, 1.0)).into_iter();
+        let mut blades = Vec::new();
+        for (z, way, at) in hung.chain([(0.1, DVec3::X, 0.5), (0.1, DVec3::X, 0.75)]) {
+            let start = points.len();
+            points.extend(blade(z, way, at));
+            blades.push((start..points.len()).collect::<Vec<usize>>());
+        }
+        let members: Vec<usize> = (0..stems).collect();
+        let organs = split(&points, &members, &blades, DVec3::ZERO, Habit::Simple);
+        assert_eq!(organs.len(), 4);
+        let main = &organs[0].points;
+        assert!(main.iter().any(|p| p.z > 0.29) && main.iter().all(|p| p.x < 0.03), "it follows the petiole");
+    }
+}
