@@ -26,8 +26,16 @@ pub(super) struct Track {
 }
 
 impl Track {
-    /// Gives the organ the points on its way back that its carrier has; `owner` holds the organ of each point.
-    pub(super) fn follow(self, points: &[DVec3], search: &Nearest, grain: f64, owner: &mut [usize]) {
+    /// Gives the organ the points on its way back that its carrier has, for as long as the carrier has others beside
+    /// them in the same nodes, which `beside` lists for a point; `owner` holds the organ of each point.
+    pub(super) fn follow<'a>(
+        self,
+        points: &[DVec3],
+        search: &Nearest,
+        grain: f64,
+        beside: impl Fn(usize) -> &'a [usize],
+        owner: &mut [usize],
+    ) {
         let Self { organ, carrier, mut at, mut way } = self;
         let (step, reach) = (STEP * grain, REACH * grain);
         let mut gaps = 0;
@@ -35,13 +43,16 @@ impl Track {
         while gaps < GAPS {
             // A little of the step before belongs to each: points at its end are on neither side for certain.
             let around = search.within(at + way * (step / 4.0), 0.75 * step + reach).into_iter().map(|n| n.index);
+            let away = |i: usize| (points[i] - at).reject_from(way).length();
             let on_way = |i: &usize| {
-                let off = points[*i] - at;
-                owner[*i] == carrier
-                    && (-step / 2.0..=step).contains(&off.dot(way))
-                    && off.reject_from(way).length() < reach
+                let along = (points[*i] - at).dot(way);
+                owner[*i] == carrier && (-step / 2.0..=step).contains(&along) && away(*i) < reach
             };
             let taken: Vec<usize> = around.filter(on_way).collect();
+            let is_other = |i: &usize| owner[*i] == carrier && away(*i) >= reach;
+            if !taken.is_empty() && !taken.iter().any(|i| beside(*i).iter().any(is_other)) {
+                break;
+            }
             let next = at + way * step;
             if taken.is_empty() {
                 (at, gaps) = (next, gaps + 1);
@@ -71,13 +82,14 @@ mod tests {
         let alone = |i: usize| i >= 60 + 20;
         let mut owner: Vec<usize> = (0..points.len()).map(|i| usize::from(alone(i))).collect();
         let track = Track { organ: 1, carrier: 0, at: points[60 + 20], way: -way };
-        track.follow(&points, &Nearest::of(&points), 0.015, &mut owner);
+        let level = |i: usize| (points[i].z / 0.03) as usize;
+        let levels: Vec<Vec<usize>> = (0..21).map(|k| (0..points.len()).filter(|i| level(*i) == k).collect()).collect();
+        track.follow(&points, &Nearest::of(&points), 0.015, |i| &levels[level(i)], &mut owner);
         // Nearer than a grain nobody can tell the two.
         for (i, p) in points.iter().enumerate().filter(|(_, p)| p.z > 0.2) {
             assert_eq!(owner[i], usize::from(i >= 60), "point {i} at {p}");
         }
-        // At 10° the way is a reach away from the stem again 6 cm below the fork.
-        assert!(owner[..4].iter().all(|organ| *organ == 0), "below the fork the way ends");
-        assert!(owner[65..80].iter().all(|organ| *organ == 1), "the petiole goes back to its fork");
+        assert_eq!(owner[..10], [0; 10], "below the fork all is the stem's");
+        assert_eq!(owner[65..80], [1; 15], "the petiole goes back to its fork");
     }
 }

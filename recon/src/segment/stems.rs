@@ -57,7 +57,7 @@ pub(super) fn split(
     let division = Division::of(&own, skeleton, &hangs, LEAST * grain, habit);
     let mut owner: Vec<usize> = node_of.iter().map(|node| division.organ_of[*node]).collect();
     for track in division.tracks() {
-        track.follow(&own, &search, grain, &mut owner);
+        track.follow(&own, &search, grain, |i| &division.skeleton.sets[node_of[i]], &mut owner);
     }
     let mut divided = vec![Vec::new(); division.organs];
     for (p, i) in all.iter().zip(members) {
