@@ -62,10 +62,10 @@ END
 
 ## Parents
 
-\`demeter eval topology\` on the clean plants, petioles and branches apart.
+\`demeter eval topology\` on the clean plants, petioles and branches apart, and on points of the authors' five plants.
 
 END
-    "$demeter" eval topology --truth "$helios/clean"
+    "$demeter" eval topology --truth "$helios/clean" --release ../shared/data/demeter-release/soybean
     echo
     cat tools/evaluation-notes.md
 } >"$page"
