@@ -6,7 +6,9 @@ pub(super) mod data;
 mod edges;
 mod equations;
 mod fields;
+mod finish;
 mod level;
+mod near;
 mod seen;
 pub(super) mod sheet;
 pub(super) mod smeared;
@@ -14,19 +16,17 @@ mod starts;
 mod state;
 mod uncertainty;
 
-use std::cell::Cell;
-
 use glam::{DQuat, DVec3};
 
 use super::centreline::course;
-use super::solver::minimise;
 use crate::model::Species;
 use crate::model::leaf::{Blade, Lattice, gauge};
-use crate::statistics::{deviation, mean};
+use crate::statistics::mean;
 use crate::traits::Sigmas;
-use data::{BESIDE, Data, NEAR};
-use edges::{Count, Edges};
-use level::Level;
+use data::{BESIDE, Data};
+use edges::Count;
+use finish::Finish;
+use near::near;
 use seen::Seen;
 use state::State;
 
@@ -39,12 +39,8 @@ const FEW_POINTS: usize = 400;
 /// Nodes that bring it near, and nodes that finish it.
 const COARSE: Lattice = Lattice::every(4, 3);
 const FINE: Lattice = Lattice::every(2, 3);
-/// With few points: how many starts go on, for how many steps, and the standard deviation of the points about the
-/// model meanwhile, as a share of the blade's length (a guess): the nearer, the more a misfit tells.
-const HEATS: [(usize, usize, f64); 3] = [(usize::MAX, 2, 0.01), (2, 4, 0.005), (1, 5, 0.005)];
-/// Rounds with all points, each of which measures their noise anew, and their steps.
+/// Rounds with all points, each of which measures their noise anew.
 const ROUNDS: usize = 2;
-const STEPS: usize = 6;
 
 /// A fitted blade in the world.
 #[derive(Clone, Debug)]
@@ -76,74 +72,25 @@ pub(crate) struct LeafFit {
 pub(crate) fn fit(points: &[DVec3], base: DVec3, up: DVec3, species: &Species) -> LeafFit {
     let few = Data::thinned(points, FEW_POINTS);
     let starts = starts::along(&course(&few.points, base, SLICES), &few.points, up, species);
-    finish(points, &few, starts.map(|state| (0, state)).to_vec(), false, up, species)
+    let data = Data::thinned(points, MAX_POINTS);
+    let finish = Finish { data: &data, species, base_moves: false };
+    finish.fit(finish.begin(near(starts, &few, species)), ROUNDS, up)
 }
 
-/// Fits a blade that hangs on nothing known: its base is at either end of its course and may move.
+/// Fits a blade that hangs on nothing known: its base is at either end of its course and may move. Which end it is, only
+/// the outline tells, so both are tried with all points; a few points and what they cost are biased to one.
 pub(super) fn alone(points: &[DVec3], up: DVec3, species: &Species) -> LeafFit {
     let few = Data::thinned(points, FEW_POINTS);
     let middle = few.points.iter().copied().sum::<DVec3>() / few.points.len().max(1) as f64;
     let far = few.points.iter().max_by(|a, b| a.distance_squared(middle).total_cmp(&b.distance_squared(middle)));
     let one = course(&few.points, far.copied().unwrap_or(middle), SLICES);
     let other: Vec<DVec3> = one.iter().rev().copied().collect();
-    let starts = |end, course: &[DVec3]| starts::along(course, &few.points, up, species).map(|state| (end, state));
-    finish(points, &few, [starts(0, &one), starts(1, &other)].concat(), true, up, species)
-}
-
-/// Brings the starts, each with the end where its base is, near with few points, each time going on with the nearest of
-/// them and with each end for as long as several go on, and finishes the last one.
-fn finish(
-    points: &[DVec3],
-    few: &Data,
-    mut starts: Vec<(usize, State)>,
-    base_moves: bool,
-    up: DVec3,
-    species: &Species,
-) -> LeafFit {
-    let apply = |state: &State, step: &_| state.stepped(step, species);
-    // One length for all starts, or their costs could not be compared.
-    let length = starts[0].1.metres();
-    for (most, steps, far) in HEATS {
-        if most > 1 && starts.len() > most {
-            let other = starts.iter().position(|(end, _)| *end != starts[0].0).unwrap_or(1);
-            starts.swap(1, other);
-        }
-        starts.truncate(most);
-        let mut ranked: Vec<(f64, (usize, State))> = Vec::with_capacity(starts.len());
-        for (end, mut state) in starts {
-            let nodes = Seen::of(state.sheet(species, COARSE), few, None).nodes;
-            let level =
-                Level { data: few, species, lattice: COARSE, sigma: far * length, edges: None, nodes, base_moves };
-            // The state that is kept is the cheapest that was tried.
-            let least = Cell::new(f64::INFINITY);
-            let normal = |state: &State| {
-                let normal = level.normal(state);
-                least.set(least.get().min(normal.cost));
-                normal
-            };
-            minimise(&mut state, steps, normal, apply);
-            ranked.push((least.get(), (end, state)));
-        }
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        starts = ranked.into_iter().map(|(_, start)| start).collect();
-    }
-    let (_, mut state) = starts.swap_remove(0);
     let data = Data::thinned(points, MAX_POINTS);
-    let mut seen = Seen::of(state.sheet(species, FINE), &data, None);
-    let (mut converged, mut sigmas, mut noise, mut inner) = (false, Sigmas::new(), 0.0, Count::default());
-    for round in 1..=ROUNDS {
-        noise = deviation(seen.heights.iter().copied());
-        let sigma = noise.max(NEAR * state.metres());
-        let edges = Some(Edges { noise, length: state.metres(), base: base_moves });
-        let level = Level { data: &data, species, lattice: FINE, sigma, edges, nodes: seen.nodes, base_moves };
-        converged = minimise(&mut state, STEPS, |state| level.normal(state), apply);
-        seen = Seen::of(state.sheet(species, FINE), &data, Some(&level.nodes));
-        if round == ROUNDS {
-            sigmas = level.sigmas(&state, up);
-            inner = level.edges.map_or(inner, |edges| edges.inner(&seen.sheet, &seen.counts));
-        }
-    }
-    LeafFit { converged, sigmas, noise, inner, ..finished(state, &seen, &data, species) }
+    let finish = Finish { data: &data, species, base_moves: true };
+    let [one, other] =
+        [one, other].map(|course| finish.trial(near(starts::along(&course, &few.points, up, species), &few, species)));
+    let better = if other.misfit(&data) < one.misfit(&data) { other } else { one };
+    finish.fit(better, ROUNDS - 1, up)
 }
 
 /// A fit that ended at `state`, but for what the way there told.

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::data::Data;
 use super::sheet::Sheet;
+use crate::statistics::mean;
 
 /// A sheet with the points that belong to each of its nodes.
 pub(super) struct Seen {
@@ -35,6 +36,15 @@ impl Seen {
         data.points.iter().zip(&self.nodes).zip(&self.heights).map(|((p, n), height)| {
             if self.sheet.on_edge(*n) { self.sheet.points[*n].distance(*p) } else { height.abs() }
         })
+    }
+
+    /// The Chamfer distance by the sheet's nodes: means over the points and over the sheet's area, halved, metres.
+    pub(super) fn chamfer(&self, data: &Data) -> f64 {
+        let to_points = |n: usize| data.tree.one(self.sheet.points[n]).map_or(0.0, |found| found.distance());
+        let areas = &self.sheet.areas;
+        let back: f64 = areas.iter().enumerate().map(|(n, area)| area * to_points(n)).sum();
+        let back = back / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        (mean(self.distances(data)).unwrap_or(0.0) + back) / 2.0
     }
 
     /// The way to each node from the point nearest to it, where that is farther than `reach` metres, with the node.
