@@ -29,6 +29,8 @@ pub(super) struct Level<'a> {
     /// The node nearest to each point when the level began.
     pub nodes: Vec<usize>,
     pub base_moves: bool,
+    /// What the priors on β and γ weigh.
+    pub prior: f64,
 }
 
 impl Level<'_> {
@@ -68,16 +70,16 @@ impl Level<'_> {
             edges.pull(sheet, &seen.counts, &mut pulls);
         }
         let mut normal = pulls.linearise(state, sheet, &jacobian, self.base_moves);
-        priors(&mut normal, state, self.species);
+        priors(&mut normal, state, self.species, self.prior);
         normal
     }
 }
 
-/// Adds the priors on β, γ and s_x.
-pub(super) fn priors(normal: &mut Normal, state: &State, species: &Species) {
+/// Adds the priors on β and γ, which weigh `weight`, and on s_x.
+pub(super) fn priors(normal: &mut Normal, state: &State, species: &Species, weight: f64) {
     let coefficients = state.beta.iter().chain(&state.gamma);
     for (i, c) in coefficients.enumerate() {
-        normal.prior(State::COEFFICIENTS + i, *c, 1.0);
+        normal.prior(State::COEFFICIENTS + i, *c, weight);
     }
     // s_x is 1 outside grasses: a pull no data outweighs keeps the step at 0.
     let weight = if species.habit == Habit::Grass { 1.0 } else { 1e12 };

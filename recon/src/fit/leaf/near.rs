@@ -26,7 +26,8 @@ pub(super) fn near(starts: impl Into<Vec<State>>, few: &Data, species: &Species)
         for mut state in starts {
             let nodes = Seen::of(state.sheet(species, COARSE), few, None).nodes;
             let sigma = far * length;
-            let level = Level { data: few, species, lattice: COARSE, sigma, edges: None, nodes, base_moves: false };
+            let level =
+                Level { data: few, species, lattice: COARSE, sigma, edges: None, nodes, base_moves: false, prior: 1.0 };
             // The state that is kept is the cheapest that was tried.
             let least = Cell::new(f64::INFINITY);
             let normal = |state: &State| {

@@ -99,7 +99,7 @@ impl Smeared<'_> {
         let count = self.cloud.count as f64;
         let miss = area.ln() + self.crowd.log_density - count.ln();
         normal.add(miss, by_area.as_slice(), 1.0 / (self.crowd.spread.powi(2) + 1.0 / count));
-        priors(&mut normal, state, self.species);
+        priors(&mut normal, state, self.species, 1.0);
         for (axis, off) in (state.base - self.cloud.base).to_array().into_iter().enumerate() {
             normal.prior(rows.parameters - 3 + axis, off, (BASE * self.crowd.noise).powi(-2));
         }
