@@ -15,6 +15,7 @@ mod leaflets;
 mod learn;
 mod left_out;
 mod meshes;
+mod odd_blades;
 mod records;
 mod segmenting;
 mod traits;
