@@ -155,7 +155,7 @@ impl Edges {
         let long = |i: usize| counted.at(i, columns / 2).distance(counted.at(i + 1, columns / 2));
         Margin {
             deep: (0..rows).map(|i| self.deep(wide(i))).collect(),
-            from: self.deep(long(0)),
+            from: self.deep(long(0)).min(rows - 1),
             to: rows - self.deep(long(rows - 2)).min(rows - 1),
         }
     }
