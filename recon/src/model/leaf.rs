@@ -321,9 +321,12 @@ fn walk(
 /// side-vein chord (right minus left) in the half-plane z = 0, x > 0.
 #[must_use]
 pub fn gauge(points: &[DVec3]) -> DQuat {
-    let chord = points[node(ROWS - 1, VEIN)] - points[node(0, VEIN)];
-    let across: DVec3 = (1..ROWS - 1).map(|i| points[node(i, COLUMNS - 1)] - points[node(i, 0)]).sum();
-    frame_of(chord, across)
+    frame_of(points[node(ROWS - 1, VEIN)] - points[node(0, VEIN)], across(points))
+}
+
+/// The sum of a grid's side-vein chords, right minus left: what the gauge rolls to z = 0.
+pub(crate) fn across(points: &[DVec3]) -> DVec3 {
+    (1..ROWS - 1).map(|i| points[node(i, COLUMNS - 1)] - points[node(i, 0)]).sum()
 }
 
 /// The rotation taking `along` to +y and `across`, made orthogonal to it, to +x; degenerate directions are replaced

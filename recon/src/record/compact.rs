@@ -12,7 +12,7 @@
 //!
 //! Quanta are powers of 2^(1/4), so that both sides agree on them in whole numbers:
 //! - Coefficient j of an organ of size S: 2^(p/4) w / (S e_j), e_j the shift of unit organs per σ ([`super::quanta`]);
-//!   at most 1/4 σ.
+//!   at most 1 σ.
 //! - d: 2^(p/4) w / S of the parent; at most 1/64.
 //! - Size (absolute, in octaves, predicted by the organ of its kind before): 2^(p/4) w / S; at most 1/64 octave.
 //! - Radius (absolute, in octaves, predicted by the parent's): 1/64 octave, for diameters are traits. s_x: likewise,
@@ -39,16 +39,16 @@ use crate::model::{Detail, Form, Joint, Knots, Organ, Plant, PlantMesh, PosedPla
 use crate::organs::ScaleSource;
 
 /// What the encoder keeps: mean distance of corresponding vertices, in diagonals of the plant's bounding box. The
-/// goal is 0.0005; the rest is left for other meshes than the one measured.
-const VERTEX_ERROR: f64 = 0.00035;
+/// goal is 0.0005; the rest is left for other meshes than the one measured, and so that rounding costs a good fit little.
+const VERTEX_ERROR: f64 = 0.00028;
 /// Sizes are whole numbers of 1/4096 octave.
 const SIZE_BITS: i32 = 12;
 /// Sizes and radii are kept within half of this many octaves, as a power of two: 0.5 %, below what anyone measures.
 const SIZE_CAP: i32 = -6;
 /// Rotations and attachments are kept at least this fine, radians or path lengths, as a power of two.
 const JOINT_CAP: i32 = -6;
-/// Coefficients are kept at least this fine, σ, as a power of two.
-const COEFFICIENT_CAP: i32 = -2;
+/// Coefficients are kept at least this fine, σ, as a power of two: so far apart are only those that hardly move anything.
+const COEFFICIENT_CAP: i32 = 0;
 
 /// The compact record of a plant: corresponding vertices of the decoded and the exact mesh differ by at most 0.0005
 /// of the bounding box's diagonal on average; every encoding is decoded and measured before it is returned.
@@ -66,9 +66,10 @@ pub fn encode_compact(plant: &Plant, species: &Species, scale_source: ScaleSourc
     })?;
     let source = Source { plant, posed };
     let effects = Effects::of(species);
-    // Begins coarse, where quanta are as large as the error that is allowed, and refines until the goal is kept.
+    // Begins coarse, where quanta are as large as the error that is allowed, refines until the goal is kept, and then
+    // halves the gap to the coarsest quanta that keep it: how the error falls differs between plants.
     let mut precision = octave_quarters(VERTEX_ERROR * unit);
-    let mut found = f64::INFINITY;
+    let (mut found, mut too_coarse, mut kept) = (f64::INFINITY, precision + 1, None);
     while let Ok(byte) = i8::try_from(precision) {
         let mut writer = Writer::new();
         let walk = Walk { species, effects: &effects, precision, source: Some(&source) };
@@ -76,14 +77,25 @@ pub fn encode_compact(plant: &Plant, species: &Species, scale_source: ScaleSourc
         let mesh = PlantMesh::of(&forward(&decoded, species)?, Detail::Control, Knots::Uniform);
         let total: f64 = mesh.positions.iter().zip(&exact.positions).map(|(a, b)| a.distance(*b)).sum();
         found = total / exact.positions.len() as f64 / unit;
+        let mut fine_enough = kept.as_ref().map(|(precision, _)| *precision);
         if found <= VERTEX_ERROR {
             let mut body = byte.to_le_bytes().to_vec();
             body.extend(writer.finish());
-            return frame(plant, species, scale_source, super::COMPACT, &body);
+            fine_enough = Some(precision);
+            kept = Some((precision, body));
+        } else {
+            too_coarse = precision;
         }
-        precision -= octave_quarters(found / VERTEX_ERROR).clamp(1, 16);
+        precision = match fine_enough {
+            Some(fine) if too_coarse - fine <= 1 => break,
+            Some(fine) => i32::midpoint(fine, too_coarse),
+            None => precision - octave_quarters(found / VERTEX_ERROR).clamp(1, 16),
+        };
     }
-    Err(RecordError::Precision { expected: VERTEX_ERROR, found })
+    match kept {
+        Some((_, body)) => frame(plant, species, scale_source, super::COMPACT, &body),
+        None => Err(RecordError::Precision { expected: VERTEX_ERROR, found }),
+    }
 }
 
 pub(super) fn read(body: &[u8], organs: usize, species: &Species) -> Result<Plant, RecordError> {
