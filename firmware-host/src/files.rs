@@ -44,6 +44,14 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
     write().map_err(|error| file_error(path, &error))
 }
 
+/// Writes a species file.
+///
+/// # Errors
+/// [`CommandError`] `species` when it cannot be serialised, `file` when it cannot be written.
+pub fn write_species(path: &Path, species: &Species) -> Result<(), CommandError> {
+    write(path, &species.to_bytes().map_err(|error| CommandError::failed("species", &error))?)
+}
+
 /// Writes a plant's mesh in the format that the path's extension names.
 ///
 /// # Errors

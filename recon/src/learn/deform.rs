@@ -66,13 +66,25 @@ impl Taught {
     /// # Errors
     /// [`LearnError`] without a single blade, or when a basis cannot be had.
     pub fn new(lessons: &[Lesson], from: &Species, components: Components) -> Result<Self, LearnError> {
+        Self::believing(lessons, from, components, [Belief::Smooth; 2])
+    }
+
+    /// The same with what is believed of blades' and of stems' bends before any is seen.
+    pub(super) fn believing(
+        lessons: &[Lesson],
+        from: &Species,
+        components: Components,
+        [of_blades, of_stems]: [Belief<'_>; 2],
+    ) -> Result<Self, LearnError> {
         let smooth = smooth(from)?;
         let leaves: Vec<&DVector<f64>> = lessons.iter().flat_map(|l| &l.leaves).collect();
         let stems: Vec<&DVector<f64>> = lessons.iter().flat_map(|l| &l.stems).collect();
         let hanging: Vec<Hanging> = lessons.iter().flat_map(|l| l.hanging.iter().copied()).collect();
-        let leaf = leaf_basis(&leaves, &smooth, components.leaf)?;
-        let stem =
-            if stems.is_empty() { from.stem.deform.clone() } else { stem_basis(&stems, &smooth, components.stem)? };
+        let leaf = leaf_basis(&leaves, &smooth, components.leaf, of_blades)?;
+        let stem = match stems.as_slice() {
+            [] => from.stem.deform.clone(),
+            stems => stem_basis(stems, &smooth, components.stem, of_stems)?,
+        };
         Ok(Self { shape: from.leaf.shape.clone(), leaf, stem, priors: priors(&hanging, &from.priors) })
     }
 
@@ -105,38 +117,59 @@ pub fn rich(from: &Species, lessons: &[Lesson]) -> Result<Species, LearnError> {
 }
 
 /// The blades' basis of `components` modes.
-pub(super) fn leaf_basis(leaves: &[&DVector<f64>], smooth: &Species, components: usize) -> Result<Basis, LearnError> {
+pub(super) fn leaf_basis(
+    leaves: &[&DVector<f64>],
+    smooth: &Species,
+    components: usize,
+    belief: Belief<'_>,
+) -> Result<Basis, LearnError> {
     let coefficients = both_ways(leaves, mirrored_leaf, &smooth.leaf.deform);
     let mean = mean(&coefficients).ok_or(LearnError::NoBlades)?;
-    shared_out(&coefficients, &Displacement::of_leaf(smooth, mean)?, components, smoothness(coefficients.len()))
+    shared_out(&coefficients, &Displacement::of_leaf(smooth, mean)?, components, belief)
 }
 
 /// The stems' basis of `components` modes.
-pub(super) fn stem_basis(stems: &[&DVector<f64>], smooth: &Species, components: usize) -> Result<Basis, LearnError> {
+pub(super) fn stem_basis(
+    stems: &[&DVector<f64>],
+    smooth: &Species,
+    components: usize,
+    belief: Belief<'_>,
+) -> Result<Basis, LearnError> {
     let coefficients = both_ways(stems, mirrored_stem, &smooth.stem.deform);
     let mean = mean(&coefficients).unwrap_or_default();
-    shared_out(&coefficients, &Displacement::of_stem(smooth, &mean)?, components, smoothness(coefficients.len()))
+    shared_out(&coefficients, &Displacement::of_stem(smooth, &mean)?, components, belief)
 }
 
-/// What is believed of bends before samples are seen: a basis of displacements, and the samples that its mean and its
-/// spread are worth.
-pub(super) type Belief = (Basis, f64, f64);
+/// What is believed of bends before any is seen.
+#[derive(Clone, Copy)]
+pub(super) enum Belief<'a> {
+    /// Smooth modes about the samples' own mean.
+    Smooth,
+    /// Mean and spread of a related species' bends, worth so many organs.
+    Kin(&'a Basis, f64),
+}
 
-/// The belief in smooth modes beside so many samples.
-fn smoothness(samples: usize) -> impl Fn(&Displacement) -> Result<Belief, BasisError> {
-    move |block| Ok((block.prior()?, 0.0, SMOOTH_SHARE * samples as f64))
+impl Belief<'_> {
+    /// The belief as a basis of displacements with the samples that its mean and its spread are worth beside so many.
+    fn worth(self, block: &Displacement, samples: usize) -> Result<(Basis, f64, f64), BasisError> {
+        Ok(match self {
+            Self::Smooth => (block.prior()?, 0.0, SMOOTH_SHARE * samples as f64),
+            // Every organ is there twice, as itself and in the mirror.
+            Self::Kin(bends, organs) => (block.of_basis(bends)?, 2.0 * organs, 2.0 * organs),
+        })
+    }
 }
 
 /// The basis of `components` modes, shared out among the blocks by their σ, at least one each.
-pub(super) fn shared_out(
+fn shared_out(
     coefficients: &[Vec<f64>],
     blocks: &[Displacement],
     components: usize,
-    belief: impl Fn(&Displacement) -> Result<Belief, BasisError>,
+    belief: Belief<'_>,
 ) -> Result<Basis, LearnError> {
     let learn = |block: &Displacement, components: usize| {
         let rows: Vec<_> = coefficients.iter().map(|c| block.of_coefficients(c).transpose()).collect();
-        let (basis, mean_samples, spread_samples) = belief(block)?;
+        let (basis, mean_samples, spread_samples) = belief.worth(block, coefficients.len())?;
         let prior = Prior { basis: &basis, mean_samples, spread_samples };
         Ok::<Pca, LearnError>(Pca::adapted(prior, &DMatrix::from_rows(&rows), components)?)
     };
@@ -157,7 +190,7 @@ pub(super) fn shared_out(
 }
 
 /// Coefficients of every organ and of its mirror image.
-pub(super) fn both_ways(
+fn both_ways(
     organs: &[&DVector<f64>],
     mirrored: impl Fn(&DVector<f64>) -> DVector<f64>,
     smooth: &Basis,
@@ -166,7 +199,7 @@ pub(super) fn both_ways(
 }
 
 /// Mean coefficients, `None` of no organs.
-pub(super) fn mean(coefficients: &[Vec<f64>]) -> Option<Vec<f64>> {
+fn mean(coefficients: &[Vec<f64>]) -> Option<Vec<f64>> {
     let first = coefficients.first()?;
     let sum = |k: usize| coefficients.iter().map(|c| c[k]).sum::<f64>();
     Some((0..first.len()).map(|k| sum(k) / coefficients.len() as f64).collect())

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use nalgebra::DVector;
 
-use super::deform::{LearnError, leaf_basis, stem_basis};
+use super::deform::{Belief, LearnError, leaf_basis, stem_basis};
 use super::lesson::Lesson;
 use super::pca::folds;
 use super::smooth::smooth;
@@ -41,10 +41,10 @@ pub fn reach(lessons: &[Lesson], from: &Species, components: &[usize]) -> Result
         for (rest, held) in folds(teaching.len(), FOLDS) {
             let leaves: Vec<&DVector<f64>> = rest.iter().flat_map(|i| &teaching[*i].leaves).collect();
             let stems: Vec<&DVector<f64>> = rest.iter().flat_map(|i| &teaching[*i].stems).collect();
-            let basis = leaf_basis(&leaves, &smooth, *k)?;
+            let basis = leaf_basis(&leaves, &smooth, *k, Belief::Smooth)?;
             leaf.extend(held.iter().flat_map(|i| &teaching[*i].leaves).map(|a| leaf_error(a, &basis, &smooth)));
             if !stems.is_empty() {
-                let basis = stem_basis(&stems, &smooth, *k)?;
+                let basis = stem_basis(&stems, &smooth, *k, Belief::Smooth)?;
                 stem.extend(held.iter().flat_map(|i| &teaching[*i].stems).map(|a| stem_error(a, &basis, &smooth)));
             }
         }

@@ -8,6 +8,7 @@ use super::harmonic::harmonic;
 use super::outline::{Outline, OutlineError, resampled};
 use super::oval::oval;
 use super::pca::{Pca, PcaError, Prior, folds, principal};
+use super::smooth::shape_modes;
 use crate::model::leaf::{COLUMNS, ROWS, node};
 use crate::model::{Basis, Knots, refine};
 
@@ -22,6 +23,10 @@ pub const FEW_SCANS: usize = 30;
 /// Scans that a related species' σ and components are worth beside few scans: as many as end their need. Their mean is
 /// worth none, because even one leaf tells more of its species' mean shape.
 const RELATED_SCANS: f64 = FEW_SCANS as f64;
+
+/// The share of smooth changes that a species of few scans keeps beside a relative's components: another species' leaves
+/// vary in other ways too, and at this share (a guess) the narrowest leaf within 3 σ is still a leaf.
+pub const UNSEEN: f64 = 0.5;
 
 /// How an outline becomes a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -114,6 +119,25 @@ pub fn widthless(shapes: &Basis) -> Result<Basis, PcaError> {
     let modes = DMatrix::from_diagonal(shapes.sigma()) * shapes.components();
     let rest = &modes - (&modes * &by_width) * by_width.transpose();
     Ok(principal(shapes.mean().clone(), &rest, shapes.rank())?.basis)
+}
+
+/// The mean grid `[45*43*2]` of leaves and their mirror images.
+#[must_use]
+pub fn mean(leaves: &[FlatLeaf]) -> DVector<f64> {
+    let rows: Vec<RowDVector<f64>> = leaves.iter().flat_map(FlatLeaf::outputs).collect();
+    rows.iter().map(RowDVector::transpose).sum::<DVector<f64>>() / rows.len().max(1) as f64
+}
+
+/// Shapes about a `mean` that vary as `shapes` do and besides by a `share` of the smooth changes of width and outline that
+/// raw leaves are fitted with (`smooth::shape_modes`).
+///
+/// # Errors
+/// [`PcaError`] when the basis is refused.
+pub fn broadened(shapes: &Basis, mean: &DVector<f64>, share: f64) -> Result<Basis, PcaError> {
+    let own = DMatrix::from_diagonal(shapes.sigma()) * shapes.components();
+    let smooth = shape_modes(mean).into_iter().map(|mode| mode * share);
+    let rows: Vec<_> = own.row_iter().map(|row| row.into_owned()).chain(smooth).collect();
+    Ok(principal(mean.clone(), &DMatrix::from_rows(&rows), rows.len())?.basis)
 }
 
 /// The shapes of a species from its leaves and their mirror images, at most `components` of them; with fewer than

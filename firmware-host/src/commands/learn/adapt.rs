@@ -2,34 +2,22 @@
 
 use std::path::PathBuf;
 
-use demeter_recon::learn::{LearnError, Lesson, adapted, rich_in_shape};
+use demeter_recon::learn::{Lesson, adapted, rich_in_shape};
 use demeter_recon::model::Species;
 use serde::Serialize;
-use serde_json::json;
 
-use super::clouds::{lessons, plant_errors, table};
+use super::clouds::{Source, plant_errors};
 use crate::error::{CommandError, Exit};
-use crate::files;
 use crate::output::Output;
 
 /// Arguments of `demeter learn adapt`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Clouds as for `demeter learn deform`.
-    #[arg(required = true)]
-    clouds: Vec<PathBuf>,
-    /// The related species: a name, or a file.
-    #[arg(long)]
-    from: String,
+    #[command(flatten)]
+    source: Source,
     /// Name of the species that comes out.
     #[arg(long)]
     name: String,
-    /// Where it goes (.safetensors).
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Where the clouds come from and under which licence, for the species' provenance.
-    #[arg(long)]
-    credit: Option<String>,
     /// Plants to judge by: also print the error of their blades against the number of clouds learned from.
     #[arg(long, num_args = 1..)]
     held_out: Vec<PathBuf>,
@@ -47,32 +35,22 @@ struct At {
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    let failed = |error: LearnError| CommandError::failed("learn", &error);
-    let from = files::species(&args.from)?;
-    let rich = rich_in_shape(&from).map_err(failed)?;
-    let (lessons, told) = lessons(&args.clouds, &rich, "shape and raw angles")?;
-    let taught = adapted(&lessons, &from).map_err(failed)?;
-    let blades: usize = lessons.iter().map(|l| l.leaves.len()).sum();
-    let provenance = format!(
-        "{} [{}]; adapted on {blades} blades of {} clouds ({}) by demeter learn adapt",
-        from.name,
-        from.provenance,
-        args.clouds.len(),
-        args.credit.as_deref().unwrap_or("no credit given")
-    );
-    let mut species = taught.species(&from, provenance).map_err(|error| CommandError::failed("species", &error))?;
+    let source = &args.source;
+    let from = source.from()?;
+    let rich = rich_in_shape(&from).map_err(|error| CommandError::failed("learn", &error))?;
+    let class = source.class(&rich, "shape and raw angles")?;
+    let learned_from = source.learned_from(&class);
+    let provenance = format!("{} [{}]; adapted on {learned_from} by demeter learn adapt", from.name, from.provenance);
+    let mut species = learned(&class.lessons, &from, provenance)?;
     species.name.clone_from(&args.name);
-    let bytes = species.to_bytes().map_err(|error| CommandError::failed("species", &error))?;
-    files::write(&args.output, &bytes)?;
-    let curve = curve(&args.held_out, &lessons, &from)?;
-    if output.json {
-        output.json(&json!({
-            "species": args.name, "output": args.output, "blades": blades, "clouds": told, "curve": curve,
-        }))?;
-    } else {
-        output.text(&format!("{}{}{blades} blades -> {}\n", table(&told), lines(&curve), args.output.display()))?;
-    }
-    Ok(if lessons.iter().any(|l| l.leaves.is_empty()) { Exit::Partial } else { Exit::Done })
+    let species = species.sealed().map_err(|error| CommandError::failed("species", &error))?;
+    let curve = curve(&args.held_out, &class.lessons, &from)?;
+    source.write(&species, &class, &curve, &lines(&curve), output)
+}
+
+fn learned(lessons: &[Lesson], from: &Species, provenance: String) -> Result<Species, CommandError> {
+    let taught = adapted(lessons, from).map_err(|error| CommandError::failed("learn", &error))?;
+    taught.species(from, provenance).map_err(|error| CommandError::failed("species", &error))
 }
 
 /// Errors of the species learned from the first 0, 1, 2, .. clouds on the blades of held-out plants.
@@ -81,13 +59,9 @@ fn curve(held_out: &[PathBuf], lessons: &[Lesson], from: &Species) -> Result<Vec
         return Ok(Vec::new());
     }
     let judge = |clouds: usize| {
-        let failed = |error: LearnError| CommandError::failed("learn", &error);
         let species = match clouds {
             0 => from.clone(),
-            _ => adapted(&lessons[..clouds], from)
-                .map_err(failed)?
-                .species(from, String::new())
-                .map_err(|error| CommandError::failed("species", &error))?,
+            _ => learned(&lessons[..clouds], from, String::new())?,
         };
         let mut errors = Vec::new();
         for path in held_out {

@@ -1,4 +1,4 @@
-//! Clouds that teach: what each gave, what was refused and why.
+//! Clouds that teach: which they are, what each gave, what was refused and why.
 
 use std::path::{Path, PathBuf};
 
@@ -9,9 +9,108 @@ use demeter_recon::segment::{Labels, Up, segment};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use serde_json::json;
 
 use crate::error::{CommandError, Exit, chain};
 use crate::files;
+use crate::output::Output;
+
+/// Where a species is learned from and where it goes.
+#[derive(Debug, clap::Args)]
+pub(super) struct Source {
+    /// Clouds. A plant: PLY in metres, z up, with `organ` and `kind` as `demeter fit --points` writes them, or with
+    /// `label`. One leaf: any other PLY, or text with x y z first, in any unit.
+    #[arg(required = true)]
+    clouds: Vec<PathBuf>,
+    /// The species to start from: a name, or a file.
+    #[arg(long)]
+    from: String,
+    /// Where the species that was learned goes (.safetensors).
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Where the clouds come from and under which licence, for the species' provenance.
+    #[arg(long)]
+    credit: Option<String>,
+}
+
+/// What all clouds gave.
+pub(super) struct Class {
+    /// One a cloud, in order; that of a cloud that teaches nothing is empty.
+    pub(super) lessons: Vec<Lesson>,
+    pub(super) told: Vec<Told>,
+}
+
+impl Source {
+    /// The species to start from.
+    pub(super) fn from(&self) -> Result<Species, CommandError> {
+        files::species(&self.from)
+    }
+
+    /// What the clouds give when their organs are fitted with `rich`; `title` stands beside the bar.
+    pub(super) fn class(&self, rich: &Species, title: &'static str) -> Result<Class, CommandError> {
+        let bar = ProgressBar::new(self.clouds.len() as u64).with_prefix(title);
+        bar.set_style(ProgressStyle::with_template("{prefix} {bar:40} {pos}/{len} {eta}").unwrap_or(bar.style()));
+        let (mut lessons, mut told) = (Vec::new(), Vec::new());
+        for path in &self.clouds {
+            let cloud = path.display().to_string();
+            let (lesson, refused) = match lesson(path, rich)? {
+                Ok(lesson) => {
+                    let refused = lesson.refused.iter().map(|r| format!("organ {}: {}", r.organ, r.reason)).collect();
+                    (lesson, refused)
+                }
+                Err(reason) => (Lesson::default(), vec![reason]),
+            };
+            told.push(Told { cloud, leaves: lesson.leaves.len(), stems: lesson.stems.len(), refused });
+            lessons.push(lesson);
+            bar.inc(1);
+        }
+        bar.finish();
+        Ok(Class { lessons, told })
+    }
+
+    /// What was learned from, for a species' provenance.
+    pub(super) fn learned_from(&self, class: &Class) -> String {
+        let credit = self.credit.as_deref().unwrap_or("no credit given");
+        format!("{} of {} clouds ({credit})", class.organs(), self.clouds.len())
+    }
+
+    /// Writes the species and tells what it was learned from and how near its `curve` comes, which `lines` has in words.
+    /// Partial when a cloud taught no blade.
+    pub(super) fn write(
+        &self,
+        species: &Species,
+        class: &Class,
+        curve: &[impl Serialize],
+        lines: &str,
+        output: &Output,
+    ) -> Result<Exit, CommandError> {
+        files::write_species(&self.output, species)?;
+        if output.json {
+            output.json(&json!({
+                "species": species.name, "output": self.output, "hash": species.hash(),
+                "blades": class.blades(), "stems": class.stems(), "clouds": class.told, "curve": curve,
+            }))?;
+        } else {
+            let table = table(&class.told);
+            output.text(&format!("{table}{lines}{} -> {}\n", class.organs(), self.output.display()))?;
+        }
+        Ok(if class.lessons.iter().any(|l| l.leaves.is_empty()) { Exit::Partial } else { Exit::Done })
+    }
+}
+
+impl Class {
+    fn blades(&self) -> usize {
+        self.lessons.iter().map(|l| l.leaves.len()).sum()
+    }
+
+    fn stems(&self) -> usize {
+        self.lessons.iter().map(|l| l.stems.len()).sum()
+    }
+
+    fn organs(&self) -> String {
+        format!("{} blades and {} stems", self.blades(), self.stems())
+    }
+}
 
 /// What one cloud gave.
 #[derive(Debug, Serialize)]
@@ -21,34 +120,6 @@ pub(super) struct Told {
     stems: usize,
     /// One reason an organ that was refused, or one for the whole cloud.
     refused: Vec<String>,
-}
-
-/// Lessons of all clouds, in order, with what is told of them; a cloud that teaches nothing has an empty one.
-pub(super) fn lessons(
-    clouds: &[PathBuf],
-    rich: &Species,
-    title: &'static str,
-) -> Result<(Vec<Lesson>, Vec<Told>), CommandError> {
-    let bar = ProgressBar::new(clouds.len() as u64).with_prefix(title);
-    bar.set_style(ProgressStyle::with_template("{prefix} {bar:40} {pos}/{len} {eta}").unwrap_or(bar.style()));
-    let (mut lessons, mut told) = (Vec::new(), Vec::new());
-    for path in clouds {
-        let cloud = path.display().to_string();
-        match lesson(path, rich)? {
-            Ok(lesson) => {
-                let refused = lesson.refused.iter().map(|r| format!("organ {}: {}", r.organ, r.reason)).collect();
-                told.push(Told { cloud, leaves: lesson.leaves.len(), stems: lesson.stems.len(), refused });
-                lessons.push(lesson);
-            }
-            Err(reason) => {
-                told.push(Told { cloud, leaves: 0, stems: 0, refused: vec![reason] });
-                lessons.push(Lesson::default());
-            }
-        }
-        bar.inc(1);
-    }
-    bar.finish();
-    Ok((lessons, told))
 }
 
 /// A PLY file with `label`, or with `organ` and `kind`, is a plant in metres, z up; any other file is one leaf.
@@ -88,7 +159,7 @@ fn read(bytes: &[u8]) -> Result<PointCloud, String> {
 }
 
 /// The table of what each cloud gave, with the refused organs below it.
-pub(super) fn table(told: &[Told]) -> String {
+fn table(told: &[Told]) -> String {
     let mut text = format!("{:>6} {:>6} {:>7}  cloud\n", "leaves", "stems", "refused");
     for t in told {
         text += &format!("{:>6} {:>6} {:>7}  {}\n", t.leaves, t.stems, t.refused.len(), t.cloud);

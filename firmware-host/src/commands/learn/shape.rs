@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use demeter_recon::learn::shape::{FEW_SCANS, FlatLeaf, GridKind, equally_wide, learn, left_out, widthless};
+use demeter_recon::learn::shape::{
+    FEW_SCANS, FlatLeaf, GridKind, UNSEEN, broadened, equally_wide, learn, left_out, mean, widthless,
+};
 use demeter_recon::learn::{Ends, PcaError, rejections};
 use demeter_recon::model::{Habit, Species};
 
@@ -81,8 +83,6 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let failed = |error: PcaError| CommandError::failed("learn", &error);
     let is_grass = from.habit == Habit::Grass;
     let relative = files::species(args.related.as_deref().unwrap_or(&args.from))?;
-    let related = relative.leaf.shape;
-    let related = if is_grass { widthless(&related).map_err(failed)? } else { related };
     let scans = scans(&args.masks, args.base.into())?;
     let (kind, kept, poor, rejected) = divided(&scans, args.grid);
     if kept.is_empty() {
@@ -92,6 +92,8 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     }
     let all: Vec<FlatLeaf> = kept.iter().chain(&poor).cloned().collect();
     let [kept, all] = [kept, all].map(|leaves| if is_grass { equally_wide(&leaves) } else { leaves });
+    let related = broadened(&relative.leaf.shape, &mean(&kept), UNSEEN).map_err(failed)?;
+    let related = if is_grass { widthless(&related).map_err(failed)? } else { related };
 
     let components = usize::from(args.components);
     let shape = learn(&kept.iter().collect::<Vec<_>>(), &related, components).map_err(failed)?;
@@ -108,10 +110,8 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     if let Some(name) = &args.name {
         species.name.clone_from(name);
     }
-    let refused = |error| CommandError::failed("species", &error);
-    let species = species.sealed().map_err(refused)?;
-    let bytes = species.to_bytes().map_err(refused)?;
-    files::write(&args.output, &bytes)?;
+    let species = species.sealed().map_err(|error| CommandError::failed("species", &error))?;
+    files::write_species(&args.output, &species)?;
     let told = Told {
         species: species.name.clone(),
         hash: species.hash().to_owned(),
@@ -159,7 +159,11 @@ fn divided(scans: &Scans, grid: Grid) -> (GridKind, Vec<FlatLeaf>, Vec<FlatLeaf>
 
 /// Where the shape comes from, then where the rest does.
 fn provenance(args: &Args, scans: &Scans, from: &Species, relative: &str, kept: usize) -> String {
-    let helped = if kept < FEW_SCANS { format!(", beside the components of {relative}") } else { String::new() };
+    let helped = if kept < FEW_SCANS {
+        format!(", beside the components of {relative} and smooth changes")
+    } else {
+        String::new()
+    };
     format!(
         "leaf shape of {kept} of {} scans ({}; BLAKE3 {}){helped} by demeter learn shape --base {} --grid {} \
          --components {}; the rest from {} [{}]",

@@ -14,8 +14,6 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
-    let species = files::species(&args.name)?;
-    let bytes = species.to_bytes().map_err(|error| CommandError::failed("species", &error))?;
-    files::write(&args.output, &bytes)?;
+    files::write_species(&args.output, &files::species(&args.name)?)?;
     Ok(Exit::Done)
 }

@@ -21,10 +21,11 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
-    let failed = |error: &dyn std::error::Error| CommandError::failed("release", error);
     // The release has no ranges; its one species is soybean.
     let ranges = files::species("soybean")?.ranges;
-    let species = bases(&args.release)?.species(&args.name, Habit::Compound, ranges).map_err(|error| failed(&error))?;
-    files::write(&args.output, &species.to_bytes().map_err(|error| failed(&error))?)?;
+    let species = bases(&args.release)?
+        .species(&args.name, Habit::Compound, ranges)
+        .map_err(|error| CommandError::failed("release", &error))?;
+    files::write_species(&args.output, &species)?;
     Ok(Exit::Done)
 }
