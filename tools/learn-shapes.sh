@@ -30,8 +30,8 @@ shape cowpea "$helios" --related "$soybean" --base left \
 shape pepper "$helios" --related "$soybean" --base left "$scans/CapsicumLeaf.png"
 # Two scans of a leaflet; TomatoLeaf.png is half a compound leaf.
 shape tomato "$helios" --related "$soybean" --base left "$scans"/{TomatoLeaf_blade,CherryTomatoLeaf}.png
-# No scan of tobacco may ship; a simple ovate leaf without lobes is nearest to it in what there is.
-shape tobacco "$helios" --related "$soybean" --base left "$scans/CapsicumLeaf.png"
+# No scan of tobacco may ship, and no leaf of what may is shaped like one: the hand-made ovals stay.
+"$demeter" species export generic:tobacco -o "$folder/tobacco.safetensors"
 # The one strap leaf; the width of each blade is s_x, the other components are the generic ones of grasses.
 shape sorghum "$helios" --base left "$scans/SorghumLeaf.png"
 shape maize "$helios" --base left "$scans/SorghumLeaf.png"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Remakes recon/species/*.safetensors from ../shared/data and from plants of pyhelios3d: `make species`, or with names of
+# Remakes recon/species/*.safetensors.gz from ../shared/data and from plants of pyhelios3d: `make species`, or with names of
 # species only those. Two runs on one machine write the same bytes. docs/species.md says what each learns from and why.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -13,7 +13,7 @@ leaves="$data/leaf-clouds/soybean/*.txt $data/leaf-clouds/sugarbeet/*.txt"
 helios="pyhelios3d 0.1.38 (MIT, LGPL-2.1+)"
 scans="leaf scans (MIT, (c) 2020 oceam)"
 
-mkdir -p "$cache" recon/species
+mkdir -p "$cache/learned" recon/species
 python=.cache/helios/bin/python
 [ -x $python ] || {
     python3 -m venv .cache/helios
@@ -25,13 +25,15 @@ if [ ! -f "$plants/complete" ]; then
 fi
 tools/learn-shapes.sh "$cache" $python
 
-# bends SPECIES CREDIT CLOUDS..: joint angles and priors on top of the shape, which is in $cache/SPECIES.safetensors.
+# bends SPECIES CREDIT CLOUDS.. [OPTIONS..]: joint angles and priors on top of the shape in $cache/SPECIES.safetensors.
 bends() {
     local species=$1 credit=$2
     shift 2
     # Exit code 3 says that some clouds taught nothing; the log says which and why.
-    "$demeter" learn deform "$@" --from "$cache/$species.safetensors" -o "recon/species/$species.safetensors" \
+    "$demeter" learn deform "$@" --from "$cache/$species.safetensors" -o "$cache/learned/$species.safetensors" \
         --credit "$credit" >"$cache/$species.log" || [ $? = 3 ]
+    # Neither name nor time: the same species packs into the same bytes.
+    gzip -9nc "$cache/learned/$species.safetensors" >"recon/species/$species.safetensors.gz"
     tail -n 1 "$cache/$species.log"
 }
 
@@ -39,8 +41,10 @@ learn() {
     case $1 in
     soybean | bean | cowpea | pepper | tomato) bends "$1" "$helios; $scans" $plants/"$1"_*.ply $leaves ;;
     maize | sorghum) bends "$1" "$helios" $plants/"$1"_*.ply ;;
-    # No tobacco may ship: its bends are those of simple broad leaves.
-    tobacco) bends tobacco "$helios, sugar beet and pepper; $scans" $plants/{sugarbeet,pepper}_*.ply $leaves ;;
+    # No tobacco may ship: its bends are those of simple broad leaves, and more of them as its shape has fewer components.
+    tobacco)
+        bends tobacco "$helios, sugar beet and pepper; $scans" $plants/{sugarbeet,pepper}_*.ply $leaves --components 30
+        ;;
     *)
         echo "learn-species: expected one of the eight species, found $1" >&2
         exit 2

@@ -108,6 +108,9 @@ pub struct Species {
 /// Why bytes are no species file.
 #[derive(Debug, thiserror::Error)]
 pub enum SpeciesError {
+    /// A packed file that does not unpack.
+    #[error("species file: expected gzip, found {0}")]
+    Packed(#[from] std::io::Error),
     /// Not safetensors, or broken.
     #[error("species file: expected safetensors, found {0}")]
     Container(#[from] safetensors::SafeTensorError),

@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 use rand::Rng;
 
 use super::Seeded;
-use super::sprout::{Sprout, bent_stem, blade_frame, coefficients, drooping_blade, normal, scattered, stem_frame};
+use super::sprout::{
+    Sprout, bend_spread, bent_stem, blade_frame, coefficients, drooping_blade, normal, scattered, stem_frame,
+};
 use crate::model::leaf::Blade;
 use crate::model::{Plant, Species};
 
@@ -38,7 +40,7 @@ pub(super) fn grow(species: &Species, age: f64, rng: &mut Seeded) -> Plant {
         let tilt = (0.85 - 0.6 * up + 0.08 * lax + 0.1 * normal(rng)).clamp(0.08, 1.3);
         // Long unfolded blades arch over by a right angle or more, the whorl's stand; the law in radians is a guess.
         let turn = (2.4 - 1.9 * up + 0.5 * lax + 0.5 * normal(rng)).clamp(-0.3, 2.9);
-        let gamma = scattered(rng, drooping_blade(species, turn), 0.6);
+        let gamma = scattered(rng, drooping_blade(species, turn), bend_spread(species, 0.6));
         let blade = Blade {
             beta: coefficients(rng, species.leaf.shape.rank(), 0.8),
             gamma,

@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 use rand::Rng;
 
 use super::Seeded;
-use super::sprout::{Sprout, bent_stem, blade_frame, coefficients, drooping_blade, normal, scattered, stem_frame};
+use super::sprout::{
+    Sprout, bend_spread, bent_stem, blade_frame, coefficients, drooping_blade, normal, scattered, stem_frame,
+};
 use crate::model::leaf::Blade;
 use crate::model::{Habit, Plant, Species};
 
@@ -85,7 +87,7 @@ impl Grower<'_> {
 
     fn blade(&self, rng: &mut Seeded) -> Blade {
         // Leaflets arch down a little.
-        let gamma = scattered(rng, drooping_blade(self.species, 0.3), 0.7);
+        let gamma = scattered(rng, drooping_blade(self.species, 0.3), bend_spread(self.species, 0.7));
         Blade { beta: coefficients(rng, self.species.leaf.shape.rank(), 0.8), gamma, width: 1.0 }
     }
 }

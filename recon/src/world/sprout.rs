@@ -117,6 +117,12 @@ pub(super) fn scattered(rng: &mut Seeded, coefficients: Vec<f64>, spread: f64) -
     coefficients.into_iter().map(|c| (c + spread * normal(rng)).clamp(-3.0, 3.0)).collect()
 }
 
+/// The spread of each of a blade's bends, given for the 15 that hand-made species have: with more of them blades are not
+/// bent more.
+pub(super) fn bend_spread(species: &Species, of_fifteen: f64) -> f64 {
+    of_fifteen * (15.0 / species.leaf.deform.rank() as f64).sqrt()
+}
+
 /// `count` standard normal coefficients times `spread`.
 pub(super) fn coefficients(rng: &mut Seeded, count: usize, spread: f64) -> Vec<f64> {
     (0..count).map(|_| normal(rng) * spread).collect()

@@ -29,6 +29,11 @@ pub(crate) fn species(name: &str) -> Species {
     demeter_recon::species::shipped(name).expect("listed").expect("valid")
 }
 
+/// The species as it is before anything is learned: its mean blade and stem are flat and straight.
+pub(crate) fn flat(name: &str) -> Species {
+    demeter_recon::species::generic(name).expect("listed").expect("valid")
+}
+
 /// A random plant of `organs` organs with plausible numbers that mean nothing botanically: any tree, any turn.
 pub(crate) fn random_plant(species: &Species, organs: usize, seed: u64) -> Plant {
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::common::{cases, random_plant, species};
+use crate::common::{cases, flat, random_plant, species};
 use demeter_frame::Pose;
 use demeter_recon::fit::OrganFit;
 use demeter_recon::model::leaf::{Blade, COLUMNS, ROWS, node};
@@ -58,7 +58,7 @@ fn example() -> Plant {
 
 #[test]
 fn a_plant_in_closed_form_has_its_traits() {
-    let species = species("soybean");
+    let species = flat("soybean");
     let traits = PlantTraits::of(&example(), &species, ScaleSource::Input).unwrap();
     let flat = species.leaf.flat(&[], 1.0);
     let width = (0..ROWS).map(|i| flat[node(i, COLUMNS - 1)].x - flat[node(i, 0)].x).fold(0.0, f64::max);
@@ -108,7 +108,7 @@ fn a_plant_in_closed_form_has_its_traits() {
 
 #[test]
 fn the_shadow_of_a_flat_blade_is_its_area_and_overlap_counts_once() {
-    let species = species("soybean");
+    let species = flat("soybean");
     let shadow = |blades: Vec<Organ>| {
         let organs = [vec![stem(None, 0.0, FRAC_PI_2, 0.3, 1e-6)], blades].concat();
         let plant = Plant { world_from_plant: Pose::IDENTITY, organs };

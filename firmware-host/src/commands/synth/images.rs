@@ -42,7 +42,8 @@ struct Sheet {
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    let (soybean, maize) = (files::species("soybean")?, files::species("maize")?);
+    // Not the learned ones: what the networks are trained on must not change with every lesson.
+    let (soybean, maize) = (files::species("generic:soybean")?, files::species("generic:maize")?);
     let failed = |error: std::io::Error| {
         CommandError::failed("output", &std::io::Error::other(format!("{}: {error}", args.output.display())))
     };

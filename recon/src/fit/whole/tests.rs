@@ -7,7 +7,7 @@ use crate::model::stem::BONES;
 use crate::world::{grow, labelled_cloud, seeded};
 
 fn soybean() -> Species {
-    crate::species::shipped("soybean").expect("listed").expect("valid")
+    crate::species::generic("soybean").expect("listed").expect("valid")
 }
 
 /// A grown plant with the points of each of its organs.
