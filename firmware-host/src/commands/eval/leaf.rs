@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use demeter_recon::baseline::{bezier, quadratic};
 use demeter_recon::fit;
@@ -11,6 +10,7 @@ use demeter_recon::model::{Detail, Knots, OrganKind, PlantMesh, Species};
 use demeter_recon::segment::{Labels, Up, segment};
 use demeter_recon::statistics::quantile;
 use glam::DVec3;
+use rustix::time::{ClockId, clock_gettime};
 
 use super::baselines::numbers;
 use super::clouds::{read, some, species_of};
@@ -119,13 +119,10 @@ fn methods(points: &[DVec3], up: DVec3, species: &Species, quick: bool) -> Vec<(
     found
 }
 
-/// Time that this thread has spent on a processor, milliseconds: other work on the machine does not lengthen it. Where
-/// the kernel does not tell, the clock on the wall.
+/// Time that this thread has spent on a processor, milliseconds: other work on the machine does not lengthen it.
 fn processor_ms() -> f64 {
-    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let nanoseconds = told.and_then(|text| text.split_ascii_whitespace().next()?.parse::<f64>().ok());
-    nanoseconds.map_or_else(|| START.get_or_init(Instant::now).elapsed().as_secs_f64() * 1e3, |ns| ns * 1e-6)
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
 }
 
 fn row(species: &str, method: &str, scores: &[Scored]) -> Vec<Cell> {

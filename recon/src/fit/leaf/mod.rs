@@ -34,6 +34,8 @@ use state::State;
 const SLICES: usize = 14;
 /// Most points of one blade that steer the fit; more only slow it down.
 const MAX_POINTS: usize = 2_000;
+/// The same for a lone blade, which is fitted from both ends.
+const MAX_LONE_POINTS: usize = 1_200;
 /// Points that bring it near.
 const FEW_POINTS: usize = 400;
 /// Nodes that bring it near, and nodes that finish it.
@@ -85,7 +87,7 @@ pub(super) fn alone(points: &[DVec3], up: DVec3, species: &Species) -> LeafFit {
     let far = few.points.iter().max_by(|a, b| a.distance_squared(middle).total_cmp(&b.distance_squared(middle)));
     let one = course(&few.points, far.copied().unwrap_or(middle), SLICES);
     let other: Vec<DVec3> = one.iter().rev().copied().collect();
-    let data = Data::thinned(points, MAX_POINTS);
+    let data = Data::thinned(points, MAX_LONE_POINTS);
     let finish = Finish { data: &data, species, base_moves: true };
     let [one, other] =
         [one, other].map(|course| finish.trial(near(starts::along(&course, &few.points, up, species), &few, species)));
