@@ -77,3 +77,6 @@ pub const BRANCH_ORDER: &str = "branch_order";
 /// Plant: area of the shadow that the surface throws on level ground under a sun at the zenith, m2. By hand: a photo
 /// from straight above with a scale beside the plant.
 pub const PROJECTED_AREA: &str = "projected_area";
+
+/// Plant: volume of the convex hull of the surface, m3. By hand: hardly; scanners report it.
+pub const HULL_VOLUME: &str = "hull_volume";

@@ -2,6 +2,7 @@
 
 mod blade;
 mod branching;
+mod hull;
 pub mod keys;
 mod shadow;
 mod uncertainty;
@@ -96,6 +97,7 @@ impl PlantTraits {
         let top = mesh.positions.iter().map(|p| p.z).fold(base, f64::max);
         put(&mut whole, keys::HEIGHT, top - base, Unit::Metre);
         put(&mut whole, keys::PROJECTED_AREA, shadow::area(&mesh), Unit::SquareMetre);
+        put(&mut whole, keys::HULL_VOLUME, hull::volume(&mesh.positions), Unit::CubicMetre);
         if scale_source == ScaleSource::None {
             for traits in organs.iter_mut().chain([&mut whole]) {
                 traits.retain(|_, quantity| !quantity.unit.is_metric());
