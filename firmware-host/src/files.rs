@@ -6,6 +6,7 @@ use std::path::Path;
 
 use demeter_recon::model::{Plant, Species};
 use demeter_recon::record::{self, Record, RecordError};
+use demeter_recon::species::NAMES;
 
 use crate::error::{CommandError, Exit};
 use crate::mesh_file::MeshFormat;
@@ -78,7 +79,7 @@ pub fn species(name: &str) -> Result<Species, CommandError> {
         let file = Path::new(name);
         return Species::from_bytes(&read(file)?).map_err(|error| CommandError::failed("species", &error).of(file));
     }
-    let known = demeter_recon::species::NAMES.join(", ");
+    let known = NAMES.join(", ");
     let found = match name.strip_prefix("generic:") {
         Some(name) => demeter_recon::species::generic(name),
         None => demeter_recon::species::shipped(name),
@@ -107,13 +108,11 @@ pub fn record(path: &Path, bytes: &[u8], species: Option<&str>) -> Result<(Recor
         refused
     };
     let wanted = record::peek(bytes).map_err(refused)?;
-    let shipped = demeter_recon::species::shipped(&wanted.name).is_some();
     let species = match species {
         Some(species) => self::species(species)?,
-        None if shipped => self::species(&wanted.name)?,
+        None if NAMES.contains(&wanted.name.as_str()) => self::species(&wanted.name)?,
         None => {
-            let found =
-                format!("none of that name among those that ship ({})", demeter_recon::species::NAMES.join(", "));
+            let found = format!("none of that name among those that ship ({})", NAMES.join(", "));
             return Err(refused(RecordError::Species { expected: wanted.to_string(), found }));
         }
     };
