@@ -7,8 +7,8 @@ use crate::nearest::Nearest;
 
 /// Length of a step back, in grains.
 const STEP: f64 = 2.0;
-/// Farthest point from a stem's way that is on it, in grains (a guess: half of it and twice it follow fewer petioles of
-/// grown soybeans, or take points of their carriers).
+/// Farthest point from a stem's way that is on it, in grains (a guess: from 0.5 to 1.4 the fits of a scanned and of grown
+/// soybeans differ by a tenth, this being among the best).
 const REACH: f64 = 0.7;
 /// Steps in a row without a point that end a way: sparse scans have gaps.
 const GAPS: usize = 2;

@@ -4,7 +4,8 @@
 use glam::DVec3;
 
 use super::MIN_ORGAN_POINTS;
-use crate::cloud::{diagonal, thinned};
+use super::lattice::one_a_cell;
+use crate::cloud::diagonal;
 use crate::fit::lone_blade;
 use crate::graph::CloudGraph;
 use crate::metrics::rough_chamfer;
@@ -49,7 +50,7 @@ struct Judged {
 
 impl Judged {
     fn of(points: &[DVec3], members: Vec<usize>, up: DVec3, species: &Species) -> Self {
-        let seen = thinned(&members.iter().map(|i| points[*i]).collect::<Vec<_>>(), SEEN);
+        let seen = few(&members.iter().map(|i| points[*i]).collect::<Vec<_>>());
         let miss = lone_blade(&seen, None, up, species).ok().and_then(|fitted| {
             let mesh = PlantMesh::of(&fitted.posed(species), Detail::Control, Knots::Uniform);
             Some(rough_chamfer(&seen, &mesh, SAMPLES)?.cd * diagonal(&seen)?)
@@ -60,8 +61,7 @@ impl Judged {
     /// The division that pays; one into more parts must pay beside the one into fewer.
     fn best_parts(&self, points: &[DVec3], up: DVec3, species: &Species) -> Option<Vec<Self>> {
         let (mut best, mut least) = (None, self.miss * self.members.len() as f64);
-        for count in 2..=PARTS {
-            let Some(parts) = self.divided(points, count) else { continue };
+        for parts in self.divisions(points) {
             let parts: Vec<Self> = parts.into_iter().map(|part| Self::of(points, part, up, species)).collect();
             let miss = parts.iter().map(|part| part.miss * part.members.len() as f64).sum();
             if miss < LEFT * least {
@@ -71,25 +71,37 @@ impl Judged {
         best
     }
 
-    /// The points by which of `count` tips, as far from each other along the blade as can be, is nearest along it.
-    fn divided(&self, points: &[DVec3], count: usize) -> Option<Vec<Vec<usize>>> {
+    /// Divisions into 2 to [`PARTS`]: the points by which of so many tips, as far from each other along the blade as can
+    /// be, is nearest along it.
+    fn divisions(&self, points: &[DVec3]) -> Vec<Vec<Vec<usize>>> {
         let own: Vec<DVec3> = self.members.iter().map(|i| points[*i]).collect();
-        let few = thinned(&own, SEEN);
+        let few = few(&own);
         let graph = CloudGraph::new(&few);
-        let farthest = |from: &[f64]| (0..from.len()).max_by(|a, b| from[*a].total_cmp(&from[*b]));
-        let mut tips = vec![farthest(&graph.distances(&[0]))?];
-        while tips.len() < count {
-            tips.push(farthest(&graph.distances(&tips))?);
-        }
-        let along: Vec<Vec<f64>> = tips.iter().map(|tip| graph.distances(&[*tip])).collect();
-        let nearest_tip = |n: usize| (0..count).min_by(|a, b| along[*a][n].total_cmp(&along[*b][n])).unwrap_or(0);
         let search = Nearest::of(&few);
-        let mut parts = vec![Vec::new(); count];
-        for (i, p) in self.members.iter().zip(&own) {
-            parts[search.one(*p).map_or(0, |n| nearest_tip(n.index))].push(*i);
+        let place: Vec<usize> = own.iter().map(|p| search.one(*p).map_or(0, |n| n.index)).collect();
+        let farthest = |from: &[f64]| (0..from.len()).max_by(|a, b| from[*a].total_cmp(&from[*b])).unwrap_or(0);
+        // The ways from each tip, and from the nearest of them.
+        let mut along = vec![graph.distances(&[farthest(&graph.distances(&[0]))])];
+        let mut nearest = along[0].clone();
+        let mut divisions = Vec::new();
+        for count in 2..=PARTS {
+            let ways = graph.distances(&[farthest(&nearest)]);
+            nearest.iter_mut().zip(&ways).for_each(|(near, way)| *near = near.min(*way));
+            along.push(ways);
+            let tip = |n: usize| (0..count).min_by(|a, b| along[*a][n].total_cmp(&along[*b][n])).unwrap_or(0);
+            let mut parts = vec![Vec::new(); count];
+            self.members.iter().zip(&place).for_each(|(i, n)| parts[tip(*n)].push(*i));
+            if parts.iter().all(|part| part.len() >= MIN_ORGAN_POINTS) {
+                divisions.push(parts);
+            }
         }
-        parts.iter().all(|part| part.len() >= MIN_ORGAN_POINTS).then_some(parts)
+        divisions
     }
+}
+
+/// At most about [`SEEN`] of the points.
+fn few(points: &[DVec3]) -> Vec<DVec3> {
+    one_a_cell(points, SEEN).into_iter().map(|i| points[i]).collect()
 }
 
 #[cfg(test)]
