@@ -81,6 +81,16 @@ pub enum ModelError {
         /// What it said.
         message: String,
     },
+    /// An output has elements of a type that no layout uses.
+    #[error("model {name}: output {output}: expected f32 or i64, found {found}")]
+    ElementType {
+        /// The model's name.
+        name: String,
+        /// The output.
+        output: String,
+        /// Its type as ONNX Runtime spells it.
+        found: String,
+    },
     /// An output has another shape than the input asks for.
     #[error("model {name}: output {output}: expected shape {expected:?}, found {found:?}")]
     Shape {
@@ -88,8 +98,8 @@ pub enum ModelError {
         name: String,
         /// The output.
         output: String,
-        /// The shape that the input and the layout ask for.
-        expected: Vec<usize>,
+        /// The shape that the input and the layout ask for; -1 for any length.
+        expected: Vec<i64>,
         /// The shape that came.
         found: Vec<usize>,
     },

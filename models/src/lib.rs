@@ -15,6 +15,7 @@ mod model;
 mod organ2d;
 mod runtime;
 mod search;
+mod tensor;
 
 pub use error::ModelError;
 pub use manifest::{DataSet, Layout, Manifest, Port, Provenance};
@@ -22,3 +23,4 @@ pub use model::{MAX_BYTES, Model};
 pub use organ2d::{Organ2d, OrganMaps};
 pub use runtime::{Runtime, RuntimeError};
 pub use search::find_manifest;
+pub use tensor::{Outputs, Tensor};

@@ -2,14 +2,15 @@ use std::io::Read;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use ndarray::{Array, Array4, ArrayView4, IxDyn};
-use ort::session::Session;
+use ndarray::{CowArray, IxDyn};
 use ort::session::builder::GraphOptimizationLevel;
+use ort::session::{Session, SessionInputValue};
 use ort::value::{Outlet, TensorRef, ValueType};
 use sha2::{Digest, Sha256};
 
 use crate::external::{self, Finding};
-use crate::{Manifest, ModelError, Port, Runtime};
+use crate::tensor::array;
+use crate::{Manifest, ModelError, Outputs, Port, Runtime, Tensor};
 
 /// The largest model file accepted, 64 MiB: ours are 2 MB, and a small box must not be filled by a wrong file.
 pub const MAX_BYTES: u64 = 64 << 20;
@@ -58,33 +59,62 @@ impl Model {
         &self.manifest
     }
 
-    /// Runs the model's one input `[n, c, h, w]`; the outputs `[n, ?, ?, ?]` come in the manifest's order, all finite.
+    /// Runs the model on its inputs, given by name in any order; the outputs come in the manifest's order, all finite.
     ///
     /// # Errors
-    /// [`ModelError::Session`], [`ModelError::Shape`] for an output that has not four dimensions,
-    /// [`ModelError::NotFinite`].
-    pub fn run(&mut self, input: ArrayView4<'_, f32>) -> Result<Vec<Array4<f32>>, ModelError> {
-        let name = &self.manifest.name;
-        let failed = |error: ort::Error| ModelError::Session { name: name.clone(), message: error.to_string() };
-        let input = input.as_standard_layout();
-        let tensor = TensorRef::from_array_view(input.view()).map_err(failed)?;
-        let outputs = self.session.run(ort::inputs![tensor]).map_err(failed)?;
-        let array = |(port, value): (&Port, ort::value::ValueRef<'_>)| {
-            let (shape, values) = value.try_extract_tensor::<f32>().map_err(failed)?;
-            let shape: Vec<usize> = shape.iter().map(|&side| side as usize).collect();
-            let output = port.name.clone();
-            if let Some(index) = values.iter().position(|value| !value.is_finite()) {
-                return Err(ModelError::NotFinite { name: name.clone(), output, found: values[index], index });
-            }
-            let array = Array::from_shape_vec(IxDyn(&shape), values.to_vec()).and_then(Array::into_dimensionality);
-            array.map_err(|_wrong_rank| ModelError::Shape {
-                name: name.clone(),
-                output,
-                expected: input.shape().to_vec(),
-                found: shape,
-            })
+    /// [`ModelError::Session`] for inputs that are missing or do not fit, [`ModelError::ElementType`] for an output that
+    /// is neither f32 nor i64, [`ModelError::NotFinite`].
+    pub fn run(&mut self, inputs: &[(&str, Tensor)]) -> Result<Outputs, ModelError> {
+        let model = &self.manifest.name;
+        let failed = |error: ort::Error| ModelError::Session { name: model.clone(), message: error.to_string() };
+        // ONNX Runtime reads arrays in row-major order only; one that lies otherwise is copied by `as_standard_layout`.
+        let inputs: Vec<_> = inputs.iter().map(|(name, tensor)| (*name, Standard::of(tensor))).collect();
+        let values = inputs.iter().map(|(name, tensor)| Ok((*name, tensor.value()?)));
+        let values = values.collect::<Result<Vec<_>, _>>().map_err(failed)?;
+        let outputs = self.session.run(values).map_err(failed)?;
+        let tensor = |(port, value): (&Port, ort::value::ValueRef<'_>)| {
+            let output = || (model.clone(), port.name.clone());
+            let tensor = if let Ok((shape, values)) = value.try_extract_tensor::<f32>() {
+                if let Some(index) = values.iter().position(|value| !value.is_finite()) {
+                    let (name, output) = output();
+                    return Err(ModelError::NotFinite { name, output, found: values[index], index });
+                }
+                array(shape, values).map(Tensor::F32)
+            } else if let Ok((shape, values)) = value.try_extract_tensor::<i64>() {
+                array(shape, values).map(Tensor::I64)
+            } else {
+                None
+            };
+            let tensor = tensor.ok_or_else(|| {
+                let (name, output) = output();
+                ModelError::ElementType { name, output, found: value.dtype().to_string() }
+            })?;
+            Ok((port.name.clone(), tensor))
         };
-        self.manifest.outputs.iter().zip(outputs.values()).map(array).collect()
+        let tensors = self.manifest.outputs.iter().zip(outputs.values()).map(tensor).collect::<Result<_, _>>()?;
+        Ok(Outputs { model: model.clone(), tensors })
+    }
+}
+
+/// A tensor whose elements lie in row-major order.
+enum Standard<'a> {
+    F32(CowArray<'a, f32, IxDyn>),
+    I64(CowArray<'a, i64, IxDyn>),
+}
+
+impl<'a> Standard<'a> {
+    fn of(tensor: &'a Tensor) -> Self {
+        match tensor {
+            Tensor::F32(array) => Self::F32(array.as_standard_layout()),
+            Tensor::I64(array) => Self::I64(array.as_standard_layout()),
+        }
+    }
+
+    fn value(&self) -> ort::Result<SessionInputValue<'_>> {
+        Ok(match self {
+            Self::F32(array) => TensorRef::from_array_view(array.view())?.into(),
+            Self::I64(array) => TensorRef::from_array_view(array.view())?.into(),
+        })
     }
 }
 

@@ -100,23 +100,17 @@ impl Organ2d {
             return Err(ModelError::EmptyImage { width, height });
         }
         let (w, h) = working_size(width, height, self.long_side);
-        let found = self.model.run(tensor(image, w, h).view())?;
-        for (output, port) in found.iter().zip(outputs()) {
-            let expected = vec![1, port.shape[1] as usize, h as usize, w as usize];
-            if output.shape() != expected {
-                let (name, found) = (self.model.manifest().name.clone(), output.shape().to_vec());
-                return Err(ModelError::Shape { name, output: port.name, expected, found });
-            }
-        }
+        let outputs = self.model.run(&[("image", tensor(image, w, h).into())])?;
+        let map = |name, channels| outputs.f32(name, [1, channels, i64::from(h), i64::from(w)]);
         // Softmax; the largest logit is taken off first so that nothing overflows.
-        let mut sem = found[0].index_axis(Axis(0), 0).to_owned();
+        let mut sem = map("sem", Semantic::ALL.len() as i64)?.index_axis(Axis(0), 0).to_owned();
         sem -= &sem.fold_axis(Axis(0), f32::NEG_INFINITY, |&a, &b| a.max(b));
         sem.mapv_inplace(f32::exp);
         sem /= &sem.sum_axis(Axis(0));
         Ok(OrganMaps {
             probabilities: Semantic::ALL.map(|class| raster(sem.index_axis(Axis(0), class as usize))),
-            dist: raster(found[1].slice(s![0, 0, .., ..])),
-            log_depth: raster(found[2].slice(s![0, 0, .., ..])),
+            dist: raster(map("dist", 1)?.slice(s![0, 0, .., ..])),
+            log_depth: raster(map("depth", 1)?.slice(s![0, 0, .., ..])),
             scale: [f64::from(width) / f64::from(w), f64::from(height) / f64::from(h)],
         })
     }

@@ -47,12 +47,10 @@ fn model() -> Model {
 #[test]
 fn outputs_are_those_that_python_pinned() {
     let (pins, mut model) = (pins(), model());
-    let outputs = model.run(image(&pins).view()).unwrap();
-    let names: Vec<_> = model.manifest().outputs.iter().map(|port| port.name.as_str()).collect();
+    let outputs = model.run(&[("image", image(&pins).into())]).unwrap();
     let mut largest = 0f32;
     for Pin { output, at: [c, y, x], value } in &pins.pins {
-        let which = names.iter().position(|name| name == output).unwrap();
-        let found = outputs[which][[0, *c, *y, *x]];
+        let found = outputs.f32(output, [1, -1, -1, -1]).unwrap()[[0, *c, *y, *x]];
         let difference = (found - value).abs();
         assert!(difference <= TOLERANCE, "{output} {c},{y},{x}: found {found}, pinned {value}");
         largest = largest.max(difference);
@@ -68,11 +66,9 @@ fn pins_notice_another_image() {
     let mut image = image(&pins);
     image.slice_mut(s![0, 1, .., ..]).mapv_inplace(|value| value * 0.9);
     let mut model = model();
-    let outputs = model.run(image.view()).unwrap();
-    let names: Vec<_> = model.manifest().outputs.iter().map(|port| port.name.clone()).collect();
+    let outputs = model.run(&[("image", image.into())]).unwrap();
     let moved = pins.pins.iter().filter(|Pin { output, at: [c, y, x], value }| {
-        let which = names.iter().position(|name| name == output).unwrap();
-        (outputs[which][[0, *c, *y, *x]] - value).abs() > TOLERANCE
+        (outputs.f32(output, [1, -1, -1, -1]).unwrap()[[0, *c, *y, *x]] - value).abs() > TOLERANCE
     });
     assert!(moved.count() * 2 > pins.pins.len());
 }
