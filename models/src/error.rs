@@ -73,6 +73,16 @@ pub enum ModelError {
         /// What is there.
         found: String,
     },
+    /// A graph is not of the layout that its manifest or its user says.
+    #[error("layout {layout:?}: expected {expected}, found {found}")]
+    Layout {
+        /// The layout.
+        layout: crate::Layout,
+        /// Its inputs and outputs.
+        expected: String,
+        /// The graph's.
+        found: String,
+    },
     /// ONNX Runtime refused the model or failed to run it.
     #[error("model {name}: ONNX Runtime: {message}")]
     Session {

@@ -10,15 +10,18 @@
 
 mod error;
 mod external;
+mod layout;
 mod manifest;
 mod model;
 mod organ2d;
 mod runtime;
 mod search;
+mod signature;
 mod tensor;
 
 pub use error::ModelError;
-pub use manifest::{DataSet, Layout, Manifest, Port, Provenance};
+pub use layout::Layout;
+pub use manifest::{DataSet, Manifest, Port, Provenance};
 pub use model::{MAX_BYTES, Model};
 pub use organ2d::{Organ2d, OrganMaps};
 pub use runtime::{Runtime, RuntimeError};

@@ -1,17 +1,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use demeter_frame::Semantic;
 use serde::{Deserialize, Serialize};
 
-use crate::ModelError;
-
-/// What a model's inputs and outputs mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Layout {
-    /// Our network for organs, boundary distance and depth: see [`crate::Organ2d`].
-    Organ2d,
-}
+use crate::{Layout, ModelError};
 
 /// One input or output.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,12 +70,20 @@ pub struct Manifest {
     pub sha256: String,
     /// What the caller must do to the input's numbers; for people.
     pub normalisation: String,
+    /// Where a model of other people comes from and on what terms; for people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// The organ that each of a detector's classes is, by the class's number; what is `background` or beyond the end is
+    /// no organ.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub classes: Vec<Semantic>,
     /// Inputs in the graph's order.
     pub inputs: Vec<Port>,
     /// Outputs in the graph's order.
     pub outputs: Vec<Port>,
-    /// Where it comes from.
-    pub provenance: Provenance,
+    /// How one of ours came to be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
 }
 
 impl Manifest {

@@ -61,9 +61,8 @@ impl Organ2d {
     /// # Errors
     /// Those of [`Model::open`], and [`ModelError::Ports`] when the manifest describes another kind of network.
     pub fn open(runtime: &Runtime, path: &Path, threads: NonZeroUsize) -> Result<Self, ModelError> {
-        let model = Model::open(runtime, path, threads)?;
+        let model = Model::open_as(runtime, path, threads, &[Layout::Organ2d])?;
         let manifest = model.manifest();
-        let Layout::Organ2d = manifest.layout;
         for (expected, found) in [(signature(&[("image", 3)]), &manifest.inputs), (outputs(), &manifest.outputs)] {
             if &expected != found {
                 let (expected, found) = (ports(&expected), ports(found));

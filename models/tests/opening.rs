@@ -102,7 +102,7 @@ fn a_file_above_the_bound_is_refused() {
     file.set_len(MAX_BYTES + 1).unwrap();
     let error = open(&path).unwrap_err();
     assert!(matches!(error, ModelError::TooLarge { expected: MAX_BYTES, .. }), "{error}");
-    file.set_len(MAX_BYTES).unwrap();
+    file.set_len(MAX_BYTES / 1024).unwrap();
     let error = open(&path).unwrap_err();
     assert!(matches!(error, ModelError::Sha256 { .. }), "{error}");
 }

@@ -1,4 +1,5 @@
 use image::{ImageBuffer, Luma, RgbImage};
+use serde::{Deserialize, Serialize};
 
 /// An 8-bit colour image.
 pub type Rgb = RgbImage;
@@ -13,7 +14,8 @@ pub type Mask = ImageBuffer<Luma<f32>, Vec<f32>>;
 pub type Instances = ImageBuffer<Luma<u16>, Vec<u16>>;
 
 /// What a pixel or a point belongs to; the numbers are the channels of `sem` in spec/models.md.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[repr(u8)]
 pub enum Semantic {
     /// Soil, pot, sky, residue.
