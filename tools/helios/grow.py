@@ -51,6 +51,21 @@ def described(organ, total, kept):
     return told | {"radius": organ.radius}
 
 
+def write_ply(path, points, organ, organs):
+    """Whole or not at all: written beside, then renamed. `organ` [count] says which of `organs` each point lies on."""
+    vertices = np.zeros(len(points), VERTEX)
+    vertices["x"], vertices["y"], vertices["z"] = points.T
+    vertices["organ"] = organ
+    vertices["label"] = np.array([o.label for o in organs])[organ]
+    vertices["kind"] = np.array([o.kind for o in organs])[organ]
+    types = {"<f4": "float", "<i4": "int", "|u1": "uchar"}
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+    header += [f"property {types[VERTEX[field].str]} {field}" for field in VERTEX.names]
+    part = path.with_suffix(".part")
+    part.write_bytes("\n".join([*header, "end_header\n"]).encode() + vertices.tobytes())
+    part.replace(path)
+
+
 def main():
     args = arguments()
     plant = grow(args.species, args.seed, args.age)
@@ -65,13 +80,8 @@ def main():
     total, kept = count(np.ones_like(lost)), count(~lost)
     points += random.normal(size=points.shape) * (args.noise_mm / 1000)
 
-    vertices = np.zeros(int((~lost).sum()), VERTEX)
-    vertices["x"], vertices["y"], vertices["z"] = points[~lost].T
-    vertices["organ"] = organ[~lost]
-    vertices["label"] = np.array([o.label for o in plant.organs])[vertices["organ"]]
-    vertices["kind"] = np.array([o.kind for o in plant.organs])[vertices["organ"]]
     truth = {
-        "species": args.species, "seed": args.seed, "age_days": args.age, "points": len(vertices),
+        "species": args.species, "seed": args.seed, "age_days": args.age, "points": int((~lost).sum()),
         "noise_m": args.noise_mm / 1000, "missing": float(lost.mean()),
         "view": None if view is None else view.tolist(),
         "height": float(high[2] - low[2]),
@@ -81,10 +91,7 @@ def main():
     }
     args.output.mkdir(parents=True, exist_ok=True)
     name = args.output / f"{args.species}_{args.seed}_{args.age:g}"
-    types = {"<f4": "float", "<i4": "int", "|u1": "uchar"}
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
-    header += [f"property {types[VERTEX[field].str]} {field}" for field in VERTEX.names]
-    name.with_name(name.name + ".ply").write_bytes("\n".join([*header, "end_header\n"]).encode() + vertices.tobytes())
+    write_ply(name.with_name(name.name + ".ply"), points[~lost], organ[~lost], plant.organs)
     name.with_name(name.name + ".json").write_text(json.dumps(truth, indent=1) + "\n")
 
 
