@@ -13,6 +13,7 @@ python3 -m pip --version >/dev/null 2>&1 || packages+=(python3-pip)
 if [ "${1:-}" = training ]; then
     /usr/bin/python3 -c 'import torch' 2>/dev/null || packages+=(python3-torch)
     /usr/bin/python3 -c 'import PIL' 2>/dev/null || packages+=(python3-pil)
+    /usr/bin/python3 -c 'import scipy' 2>/dev/null || packages+=(python3-scipy)
 fi
 
 if [ ${#packages[@]} -gt 0 ]; then

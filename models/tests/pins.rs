@@ -28,7 +28,7 @@ struct Pin {
     value: f32,
 }
 
-/// `pinned_image` of models/training/export.py.
+/// `pinned_image` of models/training/export2d.py.
 fn image(pins: &Pins) -> Array4<f32> {
     Array4::from_shape_fn((1, 3, pins.height, pins.width), |(_, c, y, x)| {
         ((x * x * (c + 1) + y * y * (3 - c) + 17 * x * y) % 251) as f32 / 250.0

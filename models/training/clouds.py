@@ -5,6 +5,7 @@ A folder holds PLY files of `tools/helios/flock.py` or `demeter synth clouds`: x
 """
 
 import hashlib
+import json
 import pathlib
 
 import numpy as np
@@ -95,8 +96,11 @@ class Clouds:
         with np.load(kept) as arrays:
             return {name: arrays[name] for name in arrays.files}
 
-    def sha256(self):
-        return hashlib.sha256("".join(self.digests).encode()).hexdigest()
+    def provenance(self):
+        """For the manifest; meta.json beside the clouds says what made them."""
+        meta = json.loads((self.folder / "meta.json").read_text())
+        sha256 = hashlib.sha256("".join(self.digests).encode()).hexdigest()
+        return {"samples": len(self.paths), "seed": meta["seed"], "program": meta["program"], "sha256": sha256}
 
 
 def turned(points, random, tilt):

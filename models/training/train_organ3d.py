@@ -127,7 +127,8 @@ def main():
         "figures": {} if args.smoke else judge(run.average, folders, args.seed),
     }
     print(provenance["figures"], flush=True)
-    export3d.write(run.average, args.out / "organ3d.onnx", args.version, provenance)
+    export3d.write(run.average, args.out, args.version, provenance)
+    print(f"wrote {args.out / 'organ3d.onnx'}", flush=True)
 
 
 if __name__ == "__main__":

@@ -4,10 +4,12 @@
 Run: .cache/helios/bin/python tools/helios/flock.py --each 80 --seed 5000 -o FOLDER
 
 Plant k of a species has seed SEED + k and an age drawn from that seed. A plant whose file is there already is not grown
-again, so a stopped run continues.
+again, so a stopped run continues; meta.json comes last.
 """
 
 import argparse
+import json
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +43,8 @@ def main():
             points, faces = sample(plant, args.points, random)
             write_ply(path, points, plant.organ[faces], plant.organs)
             print(path, flush=True)
+    made = {"seed": args.seed, "program": f"tools/helios/flock.py, pyhelios3d {version('pyhelios3d')}"}
+    (args.output / "meta.json").write_text(json.dumps(made) + "\n")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,51 @@
+"""organ2d as ONNX, its manifest and its pins (values that Rust must find again)."""
+
+import json
+
+import numpy as np
+import torch
+
+from export import write_manifest
+
+PINNED_HEIGHT, PINNED_WIDTH, PINS_A_CHANNEL = 64, 96, 9
+INPUTS = {"image": 3}
+OUTPUTS = {"sem": 4, "dist": 1, "depth": 1}
+
+
+def write(network, folder, version, provenance):
+    """organ2d.onnx, organ2d.toml and organ2d.pins.json in `folder`."""
+    write_onnx(network, folder / "organ2d.onnx")
+    ports = lambda them: [(name, [-1, channels, -1, -1], "f32") for name, channels in them.items()]
+    normalisation = "inside the graph: give RGB in 0..1, sides multiples of 16"
+    write_manifest(folder / "organ2d.toml", version, normalisation, ports(INPUTS), ports(OUTPUTS), provenance)
+    write_pins(network, folder / "organ2d.pins.json")
+
+
+def write_onnx(network, path):
+    """Opset 17; n, h and w are the caller's. Batch normalisation is folded into the convolutions."""
+    axes = {name: {0: "n", 2: "h", 3: "w"} for name in INPUTS | OUTPUTS}
+    torch.onnx.export(
+        network.eval(), torch.rand(1, 3, PINNED_HEIGHT, PINNED_WIDTH), str(path), opset_version=17,
+        input_names=list(INPUTS), output_names=list(OUTPUTS), dynamic_axes=axes,
+    )
+
+
+def pinned_image():
+    """pixel (c, y, x) = ((x x (c + 1) + y y (3 - c) + 17 x y) mod 251) / 250: whole numbers, so the same everywhere."""
+    c, y, x = np.meshgrid(np.arange(3), np.arange(PINNED_HEIGHT), np.arange(PINNED_WIDTH), indexing="ij")
+    return ((x * x * (c + 1) + y * y * (3 - c) + 17 * x * y) % 251).astype(np.float32) / np.float32(250)
+
+
+def write_pins(network, path):
+    """What PyTorch computes in single precision at some places of each output channel."""
+    with torch.no_grad():
+        outputs = network.eval()(torch.from_numpy(pinned_image())[None])
+    random = np.random.default_rng(0)
+    pins = []
+    for name, output in zip(OUTPUTS, outputs):
+        for c in range(output.shape[1]):
+            for _ in range(PINS_A_CHANNEL):
+                y, x = int(random.integers(PINNED_HEIGHT)), int(random.integers(PINNED_WIDTH))
+                pins.append({"output": name, "at": [c, y, x], "value": float(output[0, c, y, x])})
+    lines = ",\n  ".join(json.dumps(pin) for pin in pins)
+    path.write_text(f'{{"height": {PINNED_HEIGHT}, "width": {PINNED_WIDTH}, "pins": [\n  {lines}\n]}}\n')
