@@ -26,6 +26,14 @@ fn training_pictures_do_not_depend_on_threads_and_have_the_sizes_they_announce()
         assert_eq!(file.len(), 4 * 32 * 32 * bytes, "{name}");
         assert!(file == std::fs::read(three.join(name)).unwrap(), "{name} depends on the threads");
     }
+    let camera = std::fs::read(one.join("camera.f32")).unwrap();
+    assert!(camera == std::fs::read(three.join("camera.f32")).unwrap());
+    let camera: Vec<f32> = camera.chunks(4).map(|x| f32::from_le_bytes(x.try_into().unwrap())).collect();
+    assert_eq!(camera.len(), 4 * 3);
+    assert!(
+        camera.chunks(3).all(|x| (0.2..2.5).contains(&x[0]) && x[1].abs() <= 1.58 && x[2].abs() <= 3.15),
+        "{camera:?}"
+    );
     let sem = std::fs::read(one.join("sem.u8")).unwrap();
     assert!(sem.iter().all(|class| *class < 4) && sem.contains(&1), "classes 0 to 3, and some leaf");
 }

@@ -29,11 +29,11 @@ fn pictures(c: &mut Criterion) {
         b.iter(|| {
             (0..48)
                 .filter_map(|seed| training_view(&soybean, &maize, 256, seed).ok())
-                .map(|v| v.organs.len())
+                .map(|(view, _)| view.organs.len())
                 .sum::<usize>()
         });
     });
-    let view = training_view(&soybean, &maize, 256, 5).expect("valid");
+    let (view, _) = training_view(&soybean, &maize, 256, 5).expect("valid");
     group.bench_function("boundary distance", |b| b.iter(|| boundary_distance(black_box(&view.instances))));
     group.finish();
 }

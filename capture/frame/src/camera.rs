@@ -40,6 +40,12 @@ impl Intrinsics {
     /// The largest image side accepted, pixels: no rig camera comes near, a forged header does.
     pub const MAX_SIDE: u32 = 16_384;
 
+    /// Horizontal field of view, radians: the inverse of [`Self::from_hfov`].
+    #[must_use]
+    pub fn hfov(&self) -> f64 {
+        2.0 * (0.5 * f64::from(self.width) / self.fx).atan()
+    }
+
     /// Square pixels and a centred principal point from the horizontal field of view (radians).
     #[must_use]
     pub fn from_hfov(width: u32, height: u32, hfov: f64) -> Self {
@@ -105,9 +111,52 @@ pub struct Pinhole {
     pub world_from_camera: Pose,
 }
 
+/// How a camera is held, whichever way it looks: what a single picture can tell of its pose. Radians.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tilt {
+    /// Height of the optical axis above the horizon, -π/2..=π/2; negative when the camera looks down.
+    pub pitch: f64,
+    /// How far the world's up leans to the right of the picture's, -π..=π. Means nothing at a pitch of ±π/2.
+    pub roll: f64,
+}
+
+impl Pinhole {
+    /// How the camera is held in a world whose z axis points up.
+    #[must_use]
+    pub fn tilt(&self) -> Tilt {
+        let up = self.world_from_camera.rotation.inverse() * DVec3::Z;
+        Tilt { pitch: up.z.clamp(-1.0, 1.0).asin(), roll: up.x.atan2(-up.y) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DQuat;
+
+    #[test]
+    fn tilt_says_where_the_horizon_is_in_the_picture() {
+        let intrinsics = Intrinsics::from_hfov(640, 480, 1.1);
+        assert!((intrinsics.hfov() - 1.1).abs() < 1e-12);
+        for (pitch, roll) in [(0.0, 0.0), (-0.7, 0.2), (0.4, -0.5), (-1.4, 2.0)] {
+            let (sin, cos) = f64::sin_cos(pitch);
+            let level = Pose::looking_at(DVec3::new(3.0, -1.0, 2.0), DVec3::new(3.0, cos - 1.0, 2.0 + sin), DVec3::Z);
+            // Turning the camera counter-clockwise about its axis leans the picture's content to the right.
+            let turned = level.then(&Pose::new(DQuat::from_rotation_z(-roll), DVec3::ZERO));
+            let camera = Pinhole { intrinsics, world_from_camera: turned };
+            let tilt = camera.tilt();
+            assert!((tilt.pitch - pitch).abs() < 1e-9 && (tilt.roll - roll).abs() < 1e-9, "{tilt:?}");
+            // Points infinitely far away at the eye's height are seen on the line that pitch and roll give.
+            for azimuth in [-0.4, 0.0, 0.6] {
+                let away = turned.rotation.inverse() * DVec3::new(f64::sin(azimuth), f64::cos(azimuth), 0.0);
+                let Some(at) = intrinsics.project(away) else { continue };
+                let (x, y) = (at.x - intrinsics.cx, at.y - intrinsics.cy);
+                let above = -y * tilt.roll.cos() + x * tilt.roll.sin();
+                assert!((above + intrinsics.fx * tilt.pitch.tan()).abs() < 1e-6, "{above}");
+            }
+        }
+    }
 
     #[test]
     fn unproject_inverts_project_and_bad_numbers_are_named() {

@@ -9,7 +9,7 @@ mod pose;
 mod raster;
 mod stamp;
 
-pub use camera::{CameraError, Intrinsics, Pinhole};
+pub use camera::{CameraError, Intrinsics, Pinhole, Tilt};
 pub use frame::{CameraId, Frame, PixelFormat};
 pub use pose::Pose;
 pub use raster::{Depth, Instances, Mask, Rgb, Semantic};

@@ -158,7 +158,7 @@ mod tests {
     fn the_same_seed_gives_the_same_bytes_and_another_does_not() {
         assert_eq!(sample(&Sensor::FIELD).2, sample(&Sensor::FIELD).2);
         let maize = shipped("maize").expect("listed").expect("valid");
-        let view = |seed| training_view(&soybean(), &maize, 48, seed).expect("valid");
+        let view = |seed| training_view(&soybean(), &maize, 48, seed).expect("valid").0;
         assert!((0..8).all(|seed| view(seed) == view(seed) && view(seed) != view(seed + 1)));
     }
 

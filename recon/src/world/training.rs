@@ -12,12 +12,12 @@ use super::surface::Surface;
 use super::{Seeded, Sensor, View, grow, render, seeded};
 use crate::model::{Detail, Species};
 
-/// A random picture of `size` x `size` pixels with its truth: of every hundred about 35 are potted maize from the side
+/// A random picture of `size` x `size` pixels with its truth and its camera: of every hundred about 35 are potted maize from the side
 /// before white, 10 potted soybeans, 55 rows, patches and views from above, of which three quarters are soybeans.
 ///
 /// # Errors
 /// [`WorldError`], which valid species rule out.
-pub fn training_view(soybean: &Species, maize: &Species, size: u32, seed: u64) -> Result<View, WorldError> {
+pub fn training_view(soybean: &Species, maize: &Species, size: u32, seed: u64) -> Result<(View, Pinhole), WorldError> {
     let mut rng = seeded(seed);
     let kind = rng.random_range(0..100);
     let (scene, camera, exposure) = if kind < 45 {
@@ -35,7 +35,7 @@ pub fn training_view(soybean: &Species, maize: &Species, size: u32, seed: u64) -
         shot_noise: rng.random_range(0.0f32..0.2).powi(2),
         read_noise: rng.random_range(0.0f32..0.1).powi(2),
     };
-    Ok(render(&scene, &camera, &sensor, &mut rng))
+    Ok((render(&scene, &camera, &sensor, &mut rng), camera))
 }
 
 /// A camera looking from `direction` at the plants' box so that they fill about `fill` of the picture.

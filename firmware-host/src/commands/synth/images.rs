@@ -3,6 +3,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 
+use demeter_frame::Pinhole;
 use demeter_recon::world::{View, boundary_distance, training_view};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -25,7 +26,8 @@ pub(super) struct Args {
     /// Threads; the files do not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     threads: u32,
-    /// The folder: meta.json, rgb.u8 [n,h,w,3], sem.u8, dist.u8, depth.u16 (little-endian) [n,h,w].
+    /// The folder: meta.json, rgb.u8 [n,h,w,3], sem.u8, dist.u8, depth.u16 [n,h,w], camera.f32 [n,3] (horizontal field of
+    /// view, pitch, roll, radians), little-endian.
     #[arg(short, long)]
     output: PathBuf,
 }
@@ -39,6 +41,7 @@ struct Sheet {
     sem: Vec<u8>,
     dist: Vec<u8>,
     depth: Vec<u8>,
+    camera: Vec<u8>,
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
@@ -59,7 +62,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
                 for i in (k..args.count).step_by(args.threads as usize) {
                     // Seeds of one set never meet those of another with a nearby seed.
                     let seed = args.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(u64::from(i));
-                    let made = training_view(soybean, maize, args.size, seed).map(|view| Sheet::of(&view));
+                    let made = training_view(soybean, maize, args.size, seed).map(|shot| Sheet::of(&shot));
                     if send.send(made).is_err() {
                         return;
                     }
@@ -81,6 +84,8 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     bar.finish();
     let meta = serde_json::json!({
         "count": args.count, "height": args.size, "width": args.size, "seed": args.seed,
+        "camera": "camera.f32 [n,3]: horizontal field of view; pitch, the optical axis above the horizon, negative when \
+            the camera looks down; roll, by how much the world's up leans to the right of the picture's; radians",
         "program": concat!("demeter ", env!("CARGO_PKG_VERSION")),
     });
     // Written last: a folder with meta.json is complete.
@@ -91,17 +96,17 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     Ok(Exit::Done)
 }
 
-struct Files([BufWriter<File>; 4]);
+struct Files([BufWriter<File>; 5]);
 
 impl Files {
     fn create(folder: &Path) -> std::io::Result<Self> {
         std::fs::create_dir_all(folder)?;
         let file = |name| File::create(folder.join(name)).map(BufWriter::new);
-        Ok(Self([file("rgb.u8")?, file("sem.u8")?, file("dist.u8")?, file("depth.u16")?]))
+        Ok(Self([file("rgb.u8")?, file("sem.u8")?, file("dist.u8")?, file("depth.u16")?, file("camera.f32")?]))
     }
 
     fn write(&mut self, sheet: &Sheet) -> std::io::Result<()> {
-        let parts = [&sheet.rgb, &sheet.sem, &sheet.dist, &sheet.depth];
+        let parts = [&sheet.rgb, &sheet.sem, &sheet.dist, &sheet.depth, &sheet.camera];
         self.0.iter_mut().zip(parts).try_for_each(|(file, part)| file.write_all(part))
     }
 
@@ -112,13 +117,16 @@ impl Files {
 }
 
 impl Sheet {
-    fn of(view: &View) -> Self {
+    fn of((view, camera): &(View, Pinhole)) -> Self {
+        let tilt = camera.tilt();
+        let seen = [camera.intrinsics.hfov(), tilt.pitch, tilt.roll];
         let dist = boundary_distance(&view.instances);
         Self {
             rgb: view.rgb.as_raw().clone(),
             sem: view.semantic.as_raw().clone(),
             dist: dist.as_raw().iter().map(|t| (t * 255.0).round() as u8).collect(),
             depth: view.depth.as_raw().iter().flat_map(|z| depth_code(*z).to_le_bytes()).collect(),
+            camera: seen.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect(),
         }
     }
 }
