@@ -14,7 +14,7 @@ mod up;
 
 use glam::DVec3;
 
-use crate::cloud::{PointCloud, diagonal};
+use crate::cloud::{PointCloud, PointOrgan, diagonal};
 use crate::fit;
 use crate::model::{Habit, OrganKind, Species};
 use crate::nearest::Nearest;
@@ -77,6 +77,18 @@ pub struct Segmented {
     pub organs: Vec<OrganCloud>,
     /// Unit vertical in the cloud's frame.
     pub up: DVec3,
+}
+
+impl Segmented {
+    /// The organ of each of the cloud's `count` points, by its index; negative for those that no organ has.
+    #[must_use]
+    pub fn of_points(&self, count: usize) -> Vec<PointOrgan> {
+        let mut of = vec![PointOrgan { organ: -1, kind: OrganKind::Stem }; count];
+        for (k, organ) in (0..).zip(&self.organs) {
+            organ.source.iter().for_each(|i| of[*i as usize] = PointOrgan { organ: k, kind: organ.kind });
+        }
+        of
+    }
 }
 
 /// Divides a cloud into organs.

@@ -14,6 +14,8 @@ mod clouds;
 mod fit;
 mod leaf;
 mod picture;
+mod release;
+mod segment;
 mod table;
 mod topology;
 mod traits;
@@ -32,6 +34,8 @@ enum Which {
     Fit(fit::Args),
     /// Chamfer distance and time of single blades, beside loose surfaces.
     Leaf(leaf::Args),
+    /// Clouds divided into organs without their labels: instances, classes, blades, stems.
+    Segment(segment::Args),
     /// Share of organs with the right parent.
     Topology(topology::Args),
     /// Traits of the decoded record against a generator's truth.
@@ -46,6 +50,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let table = match &args.table {
         Which::Fit(args) => fit::table(args)?,
         Which::Leaf(args) => leaf::table(args)?,
+        Which::Segment(args) => segment::table(args)?,
         Which::Topology(args) => topology::table(args)?,
         Which::Traits(args) => traits::table(args)?,
     };

@@ -1,9 +1,11 @@
-//! A cloud beside the surface fitted to it, each organ in its colour, for people to look at.
+//! A cloud beside what was made of it, each organ in its colour, for people to look at.
 
 use std::io::Cursor;
 use std::path::Path;
 
+use demeter_recon::cloud::PointOrgan;
 use demeter_recon::metrics::sample_surface;
+use demeter_recon::model::OrganKind;
 use glam::{DMat3, DVec3};
 use image::{ImageFormat, Rgb, RgbImage};
 
@@ -19,6 +21,8 @@ const MARGIN: f64 = 20.0;
 const SAMPLES: usize = 120_000;
 /// Colour of points that no organ was fitted to.
 const NOBODYS: Rgb<u8> = Rgb([200, 200, 200]);
+/// Colour of the main stem, or of all stems, where organs are beside their truth.
+const MAIN_STEM: Rgb<u8> = Rgb([230, 0, 0]);
 
 /// Writes `path` (.png): the points of the cloud by the organ they were given to, and the plant, seen level from the
 /// side on which it spreads most.
@@ -33,12 +37,36 @@ pub(super) fn write(path: &Path, points: &[DVec3], fitted: &Fitted) -> Result<()
     }
     let mesh = &fitted.described.mesh;
     let surface = sample_surface(mesh, SAMPLES, 0);
+    let painted = surface.into_iter().map(|(point, face)| (point, colour(mesh.organ_of_face[face] as usize)));
     let up = fitted.described.plant.world_from_plant.rotation * DVec3::Z;
+    pair(path, points, up, [points.iter().copied().zip(colours).collect(), painted.collect()])
+}
+
+/// Writes `path` (.png): the points of a cloud by their true organs, and by those that were found.
+///
+/// # Errors
+/// As [`write`].
+pub(super) fn divisions(
+    path: &Path,
+    points: &[DVec3],
+    up: DVec3,
+    organs: [&[PointOrgan]; 2],
+) -> Result<(), CommandError> {
+    let of = |point: &PointOrgan| match (usize::try_from(point.organ), point.kind) {
+        (Err(_), _) => NOBODYS,
+        (Ok(_), OrganKind::MainStem) => MAIN_STEM,
+        (Ok(organ), _) => colour(organ),
+    };
+    pair(path, points, up, organs.map(|organs| points.iter().copied().zip(organs.iter().map(of)).collect()))
+}
+
+/// Two pictures of points side by side, framed alike.
+fn pair(path: &Path, points: &[DVec3], up: DVec3, dots: [Vec<(DVec3, Rgb<u8>)>; 2]) -> Result<(), CommandError> {
     let panel = Panel::around(points, up);
     let mut picture = RgbImage::from_pixel(2 * SIDE, SIDE, Rgb([255; 3]));
-    panel.draw(&mut picture, 0, points.iter().copied().zip(colours));
-    let painted = surface.into_iter().map(|(point, face)| (point, colour(mesh.organ_of_face[face] as usize)));
-    panel.draw(&mut picture, SIDE, painted);
+    for (left, dots) in [0, SIDE].into_iter().zip(dots) {
+        panel.draw(&mut picture, left, dots.into_iter());
+    }
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, ImageFormat::Png).map_err(|error| CommandError::failed("picture", &error))?;
     files::write(path, &bytes.into_inner())

@@ -3,26 +3,23 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use demeter_recon::import::release::{RawForm, RawPlant};
-use demeter_recon::metrics::{Parents, SURFACE_SAMPLES, right_parents, sample_surface};
-use demeter_recon::model::{Detail, Knots, OrganKind, PlantMesh};
+use demeter_recon::cloud::PointCloud;
+use demeter_recon::metrics::{MIN_SEEN_POINTS, Parents, right_parents};
 use demeter_recon::organs::{OrganCloud, OrganTree};
 use demeter_recon::segment::{Labels, Up, segment};
 use demeter_recon::{species, tree};
 use glam::DVec3;
 
 use super::clouds::read;
+use super::release::{self, Released};
 use super::table::{Cell, Table};
 use super::truth::Truth;
-use super::{files_of, folder, progress};
-use crate::commands::import::{bases, release_plant};
+use super::{files_of, progress};
 use crate::error::CommandError;
 use crate::files;
 
 /// Goal of issue 3: share of organs with the right parent.
 const GOAL: f64 = 0.95;
-/// An organ of fewer points is none to a scan: buds, and what occlusion left of others.
-const MIN_POINTS: usize = 12;
 
 /// Arguments of `demeter eval topology`.
 #[derive(Debug, clap::Args)]
@@ -73,7 +70,7 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
         ]);
     }
     table.notes.push(format!(
-        "organs are given apart, with their kinds; every organ of {MIN_POINTS} points and more but the main stem counts"
+        "organs are given apart, with their kinds; every organ of {MIN_SEEN_POINTS} points and more but the main stem counts"
     ));
     Ok(table)
 }
@@ -88,19 +85,10 @@ fn grown(folder: &PathBuf, cases: &mut Vec<Case>) -> Result<(), CommandError> {
         if !species::NAMES.contains(&truth.species.as_str()) {
             continue;
         }
-        let cloud = read(&cloud_path, 1.0)?;
-        let species = files::species(&truth.species)?;
-        let organs = segment(&cloud, &species, Labels::Auto, Up::Axis(DVec3::Z))
-            .map_err(|error| CommandError::failed("segmentation", &error).of(&cloud_path))?
-            .organs;
-        let Some(organ_of_point) = &cloud.organs else {
-            let message = format!("{}: expected the properties `organ` and `kind`, found none", cloud_path.display());
-            return Err(CommandError::usage("truth", message));
-        };
         cases.push(Case {
-            found: parents(organs, &cloud_path, |point| organ_of_point[point as usize].organ)?,
+            found: parents(&read(&cloud_path, 1.0)?, &truth.species, &cloud_path)?,
             truth: truth.organs.iter().map(|organ| (organ.id, organ.parent)).collect(),
-            seen: truth.organs.iter().filter(|organ| organ.points >= MIN_POINTS).map(|organ| organ.id).collect(),
+            seen: truth.organs.iter().filter(|organ| organ.points >= MIN_SEEN_POINTS).map(|organ| organ.id).collect(),
             species: truth.species,
         });
     }
@@ -108,48 +96,32 @@ fn grown(folder: &PathBuf, cases: &mut Vec<Case>) -> Result<(), CommandError> {
 }
 
 /// Plants that the authors fitted.
-fn released(release: &PathBuf, cases: &mut Vec<Case>) -> Result<(), CommandError> {
-    let release = folder(Some(release), "", "--release")?;
-    let bases = bases(&release)?;
-    for path in files_of(&release, "pkl")? {
-        let plant_folder = path.parent().unwrap_or(&release);
-        let raw = RawPlant::of(&release_plant(plant_folder)?, &bases);
-        let posed = raw.pose().map_err(|error| CommandError::failed("release", &error).of(plant_folder))?;
-        let mesh = PlantMesh::of(&posed, Detail::Control, Knots::Uniform);
-        let mut organs: Vec<OrganCloud> = raw
-            .organs
-            .iter()
-            .map(|organ| OrganCloud {
-                kind: match (&organ.form, organ.parent) {
-                    (RawForm::Leaf { .. }, _) => OrganKind::Leaf,
-                    (RawForm::Stem { .. }, None) => OrganKind::MainStem,
-                    (RawForm::Stem { .. }, Some(_)) => OrganKind::Stem,
-                },
-                points: Vec::new(),
-                source: Vec::new(),
-            })
-            .collect();
-        for (point, face) in sample_surface(&mesh, SURFACE_SAMPLES, 1) {
-            let id = mesh.organ_of_face[face];
-            organs[id as usize].points.push(point);
-            organs[id as usize].source.push(id);
-        }
-        let seen: Vec<usize> = (0..organs.len()).filter(|id| organs[*id].points.len() >= MIN_POINTS).collect();
-        organs.retain(|organ| !organ.points.is_empty());
+fn released(folder: &PathBuf, cases: &mut Vec<Case>) -> Result<(), CommandError> {
+    for Released { folder, raw, cloud } in release::plants(folder)? {
+        let mut points: BTreeMap<i32, usize> = BTreeMap::new();
+        cloud.organs.iter().flatten().for_each(|point| *points.entry(point.organ).or_default() += 1);
         cases.push(Case {
-            species: "soybean, the release's".into(),
-            found: parents(organs, plant_folder, |id| id as i32)?,
+            found: parents(&cloud, "soybean", &folder)?,
             truth: (0..).zip(&raw.organs).map(|(id, organ)| (id, organ.parent.map(|parent| parent as i32))).collect(),
-            seen: seen.into_iter().map(|id| id as i32).collect(),
+            seen: points.into_iter().filter(|(_, n)| *n >= MIN_SEEN_POINTS).map(|(id, _)| id).collect(),
+            species: release::NAME.into(),
         });
     }
     Ok(())
 }
 
-/// Parents in the tree made of the organs, by the ids that `id` gives what their points came from.
-fn parents(organs: Vec<OrganCloud>, path: &Path, id: impl Fn(u32) -> i32) -> Result<Parents, CommandError> {
+/// Parents in the tree made of a cloud's own organs, by their numbers.
+fn parents(cloud: &PointCloud, species: &str, path: &Path) -> Result<Parents, CommandError> {
+    let Some(organ_of_point) = &cloud.organs else {
+        let message = format!("{}: expected the properties `organ` and `kind`, found none", path.display());
+        return Err(CommandError::usage("truth", message));
+    };
+    let organs = segment(cloud, &files::species(species)?, Labels::Auto, Up::Axis(DVec3::Z))
+        .map_err(|error| CommandError::failed("segmentation", &error).of(path))?
+        .organs;
     let OrganTree { organs, parent } =
         tree::build(organs).map_err(|error| CommandError::failed("topology", &error).of(path))?;
-    let ids: Vec<i32> = organs.iter().map(|organ| organ.source.first().map_or(-1, |point| id(*point))).collect();
-    Ok(ids.iter().zip(&parent).map(|(organ, parent)| (*organ, parent.map(|parent| ids[parent]))).collect())
+    let number = |organ: &OrganCloud| organ.source.first().map_or(-1, |point| organ_of_point[*point as usize].organ);
+    let numbers: Vec<i32> = organs.iter().map(number).collect();
+    Ok(numbers.iter().zip(&parent).map(|(organ, parent)| (*organ, parent.map(|parent| numbers[parent]))).collect())
 }
