@@ -125,6 +125,36 @@ pub enum ModelError {
         /// Its place in row-major order.
         index: usize,
     },
+    /// The ports of a file are those of no layout.
+    #[error("{path}: expected the inputs and outputs of a known layout, found {found}; --layout says which is meant",
+        path = path.display())]
+    Unrecognised {
+        /// The file.
+        path: PathBuf,
+        /// Its inputs and outputs.
+        found: String,
+    },
+    /// A name that could be another place's.
+    #[error(
+        "model name: expected letters, digits, `-`, `_` and `.`, beginning with a letter or digit, found {found:?}"
+    )]
+    Name {
+        /// The name.
+        found: String,
+    },
+    /// Something else is installed under this name.
+    #[error("{path}: expected nothing or the same, found another; --replace puts the new one in its place",
+        path = path.display())]
+    Exists {
+        /// The file that is there.
+        path: PathBuf,
+    },
+    /// A detector without one class that is an organ.
+    #[error("model {name}: expected `classes` to say which of its classes are organs, found none")]
+    Classes {
+        /// The model's name.
+        name: String,
+    },
     /// The image has no pixels.
     #[error("image: expected at least 1 x 1 pixels, found {width} x {height}")]
     EmptyImage {

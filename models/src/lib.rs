@@ -8,22 +8,43 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod depth;
+mod depth_anything;
 mod error;
 mod external;
+mod install;
+mod instance;
 mod layout;
 mod manifest;
+mod mask_rcnn;
+mod meter;
 mod model;
 mod organ2d;
+mod organs;
+mod pixels;
 mod runtime;
+mod sam;
 mod search;
 mod signature;
 mod tensor;
+mod u2net;
+mod yolo_seg;
 
+pub use depth::{DepthMap, DepthNetwork};
+pub use depth_anything::DepthAnything;
 pub use error::ModelError;
+pub use install::Candidate;
+pub use instance::Instance;
 pub use layout::Layout;
 pub use manifest::{DataSet, Manifest, Port, Provenance};
+pub use mask_rcnn::MaskRcnn;
+pub use meter::Meter;
 pub use model::{MAX_BYTES, Model};
 pub use organ2d::{Organ2d, OrganMaps};
+pub use organs::OrganNetwork;
 pub use runtime::{Runtime, RuntimeError};
-pub use search::find_manifest;
+pub use sam::{Cutout, Embedding, SamDecoder, SamEncoder};
+pub use search::{find_manifest, find_manifests};
 pub use tensor::{Outputs, Tensor};
+pub use u2net::U2net;
+pub use yolo_seg::YoloSeg;

@@ -1,6 +1,7 @@
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::ModelError;
+use crate::{Manifest, ModelError};
 
 /// Where packages put models.
 const SYSTEM_MODELS: &str = "/usr/share/demeter/models";
@@ -25,11 +26,32 @@ pub(crate) fn upwards(relative: &str) -> Vec<PathBuf> {
 /// # Errors
 /// [`ModelError::Missing`] with the folders looked at.
 pub fn find_manifest(name: &str) -> Result<PathBuf, ModelError> {
-    let folders = std::env::var_os("DEMETER_MODELS").filter(|folder| !folder.is_empty()).map_or_else(
+    first_manifest(name, folders())
+}
+
+/// The manifests of every model that [`find_manifest`] finds, in the order of their names.
+#[must_use]
+pub fn find_manifests() -> Vec<PathBuf> {
+    all_manifests(&folders())
+}
+
+fn folders() -> Vec<PathBuf> {
+    std::env::var_os("DEMETER_MODELS").filter(|folder| !folder.is_empty()).map_or_else(
         || upwards("models").into_iter().chain([PathBuf::from(SYSTEM_MODELS)]).collect(),
         |folder| vec![PathBuf::from(folder)],
-    );
-    first_manifest(name, folders)
+    )
+}
+
+fn all_manifests(folders: &[PathBuf]) -> Vec<PathBuf> {
+    let mut found = BTreeMap::new();
+    for entry in folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten() {
+        let path = entry.path();
+        // A manifest describes a model beside it; other TOML files may lie there.
+        if path.extension().is_some_and(|end| end == "toml") && Manifest::model_path(&path).is_file() {
+            found.entry(entry.file_name()).or_insert(path);
+        }
+    }
+    found.into_values().collect()
 }
 
 fn first_manifest(name: &str, folders: Vec<PathBuf>) -> Result<PathBuf, ModelError> {
@@ -51,6 +73,12 @@ mod tests {
         assert_eq!(first_manifest("net", folders()).unwrap(), b.path().join("net.toml"));
         std::fs::write(a.path().join("net.toml"), "").unwrap();
         assert_eq!(first_manifest("net", folders()).unwrap(), a.path().join("net.toml"));
+        // Without its model a manifest is not listed, and of two of a name the first is.
+        assert_eq!(all_manifests(&folders()), [] as [PathBuf; 0]);
+        for folder in [&a, &b] {
+            std::fs::write(folder.path().join("net.onnx"), "").unwrap();
+        }
+        assert_eq!(all_manifests(&folders()), [a.path().join("net.toml")]);
     }
 
     #[test]
