@@ -19,6 +19,7 @@ pub mod model;
 pub mod nearest;
 pub mod organs;
 mod polyline;
+pub mod pyramid;
 pub mod record;
 pub mod segment;
 pub mod species;

@@ -92,7 +92,7 @@ impl Nearest {
     }
 }
 
-fn in_reach(p: DVec3) -> bool {
+pub(crate) fn in_reach(p: DVec3) -> bool {
     p.abs().max_element() < FARTHEST_METRES && !p.is_nan()
 }
 

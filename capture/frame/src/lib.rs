@@ -6,11 +6,13 @@
 mod camera;
 mod frame;
 mod pose;
+mod pyramid;
 mod raster;
 mod stamp;
 
 pub use camera::{CameraError, Intrinsics, Pinhole, Tilt};
 pub use frame::{CameraId, Frame, PixelFormat};
 pub use pose::Pose;
+pub use pyramid::{ABOVE, LOCAL, NEIGHBOURS, PointMaps, PointPyramid, PyramidLevel};
 pub use raster::{Depth, Instances, Mask, Rgb, Semantic};
 pub use stamp::Stamp;
