@@ -9,6 +9,8 @@ use crate::{ModelError, Port};
 pub enum Layout {
     /// Our network for organs, boundary distance and depth: see [`crate::Organ2d`].
     Organ2d,
+    /// Our network for organs in point clouds: see [`crate::Organ3d`].
+    Organ3d,
     /// Depth Anything, relative: inverse depth up to scale and shift.
     DepthAnything,
     /// Depth Anything, metric: metres. The same ports as the relative one, so it must be said.

@@ -2,7 +2,7 @@
 //!
 //! The only crate that names `ort`. A [`Runtime`] is the shared library, loaded once a process; a [`Model`] is a
 //! session whose file was verified against its [`Manifest`] before anything parsed it; [`Organ2d`] is our network for
-//! organs and depth. A model file is refused when it is too large, altered, truncated, keeps weights in other files, or
+//! organs and depth, [`Organ3d`] that for organs in point clouds. A model file is refused when it is too large, altered, truncated, keeps weights in other files, or
 //! has inputs or outputs other than its manifest says; an output with a NaN or an infinity is an error, because ONNX
 //! Runtime passes them on silently.
 
@@ -20,6 +20,7 @@ mod mask_rcnn;
 mod meter;
 mod model;
 mod organ2d;
+mod organ3d;
 mod organs;
 mod pixels;
 mod runtime;
@@ -41,6 +42,7 @@ pub use mask_rcnn::MaskRcnn;
 pub use meter::Meter;
 pub use model::{MAX_BYTES, Model};
 pub use organ2d::{Organ2d, OrganMaps};
+pub use organ3d::Organ3d;
 pub use organs::OrganNetwork;
 pub use runtime::{Runtime, RuntimeError};
 pub use sam::{Cutout, Embedding, SamDecoder, SamEncoder};

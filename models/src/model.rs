@@ -65,6 +65,18 @@ impl Model {
         Err(ModelError::Ports { name, expected: format!("one of {layouts:?}"), found: format!("{layout:?}") })
     }
 
+    /// Refuses other ports than these, which may differ from the manifest's even where graph and manifest agree.
+    pub(crate) fn needs(&self, inputs: &[Port], outputs: &[Port]) -> Result<(), ModelError> {
+        let Manifest { name, inputs: found_inputs, outputs: found_outputs, .. } = &self.manifest;
+        for (expected, found) in [(inputs, found_inputs), (outputs, found_outputs)] {
+            if expected != found {
+                let (expected, found) = (ports(expected), ports(found));
+                return Err(ModelError::Ports { name: name.clone(), expected, found });
+            }
+        }
+        Ok(())
+    }
+
     /// The execution provider that runs every node: sessions register no other, and this one is always there.
     pub const PROVIDER: &str = "CPUExecutionProvider";
 

@@ -6,7 +6,6 @@ use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageBuffer, Luma};
 use ndarray::{Array4, ArrayView2, Axis, s};
 
-use crate::model::ports;
 use crate::{Layout, Model, ModelError, Port, Runtime};
 
 /// The network halves its input four times, so sides are multiples of this many pixels.
@@ -62,13 +61,7 @@ impl Organ2d {
     /// Those of [`Model::open`], and [`ModelError::Ports`] when the manifest describes another kind of network.
     pub fn open(runtime: &Runtime, path: &Path, threads: NonZeroUsize) -> Result<Self, ModelError> {
         let model = Model::open_as(runtime, path, threads, &[Layout::Organ2d])?;
-        let manifest = model.manifest();
-        for (expected, found) in [(signature(&[("image", 3)]), &manifest.inputs), (outputs(), &manifest.outputs)] {
-            if &expected != found {
-                let (expected, found) = (ports(&expected), ports(found));
-                return Err(ModelError::Ports { name: manifest.name.clone(), expected, found });
-            }
-        }
+        model.needs(&signature(&[("image", 3)]), &outputs())?;
         Ok(Self { model, long_side: Self::LONG_SIDE })
     }
 

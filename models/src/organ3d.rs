@@ -4,7 +4,6 @@ use std::path::Path;
 use demeter_frame::{ABOVE, LOCAL, NEIGHBOURS, PointMaps, PointPyramid};
 use ndarray::{Array1, Array2};
 
-use crate::model::ports;
 use crate::{Layout, Model, ModelError, Port, Runtime, Tensor};
 
 /// Our network for organs in point clouds: a U-Net over points trained by models/training/train_organ3d.py, in the role
@@ -23,14 +22,8 @@ impl Organ3d {
     /// # Errors
     /// Those of [`Model::open`], and [`ModelError::Ports`] when the manifest describes another kind of network.
     pub fn open(runtime: &Runtime, path: &Path, threads: NonZeroUsize) -> Result<Self, ModelError> {
-        let model = Model::open(runtime, path, threads)?;
-        let manifest = model.manifest();
-        for (expected, found) in [(inputs(), &manifest.inputs), (outputs(), &manifest.outputs)] {
-            if manifest.layout != Layout::Organ3d || &expected != found {
-                let (expected, found) = (ports(&expected), ports(found));
-                return Err(ModelError::Ports { name: manifest.name.clone(), expected, found });
-            }
-        }
+        let model = Model::open_as(runtime, path, threads, &[Layout::Organ3d])?;
+        model.needs(&inputs(), &outputs())?;
         Ok(Self { model })
     }
 
