@@ -22,6 +22,8 @@ pub struct Config {
     pub store: StoreConfig,
     /// Where the page and the API listen.
     pub api: ApiConfig,
+    /// Which networks look at pictures.
+    pub models: ModelsConfig,
     /// Where frames come from; without it stored plants are served and nothing else.
     pub source: Option<SourceConfig>,
 }
@@ -51,6 +53,27 @@ pub struct ApiConfig {
 impl Default for ApiConfig {
     fn default() -> Self {
         Self { listen: (Ipv4Addr::LOCALHOST, 8420).into() }
+    }
+}
+
+/// Name of our network's manifest.
+pub const OURS: &str = "organ2d";
+
+/// `[models]`: names of installed models (`demeter models list`) in place of what our network says (docs/models.md).
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ModelsConfig {
+    /// What parts plants from the rest: nothing, U²-Net alone, or SAM's encoder and decoder.
+    pub mask: Vec<String>,
+    /// What finds the organs.
+    pub organs: String,
+    /// What gives depth.
+    pub depth: String,
+}
+
+impl Default for ModelsConfig {
+    fn default() -> Self {
+        Self { mask: Vec::new(), organs: OURS.into(), depth: OURS.into() }
     }
 }
 
@@ -173,6 +196,14 @@ impl Config {
                 found: config.api.listen.to_string(),
             });
         }
+        if config.models.mask.len() > 2 {
+            return Err(ConfigError::Value {
+                path: path.into(),
+                key: "models.mask",
+                expected: "at most two names: a saliency network, or SAM's encoder and decoder",
+                found: format!("{:?}", config.models.mask),
+            });
+        }
         Ok(config)
     }
 }
@@ -207,6 +238,8 @@ mod tests {
         let config = read("[store]\npath = 'x.sqlite'\n[api]\nlisten = '[::1]:80'").unwrap();
         assert_eq!(config.store.path, Path::new("x.sqlite"));
         assert_eq!(config.api.listen.port(), 80);
+        let config = read("[models]\nmask = ['e', 'd']\ndepth = 'meter'").unwrap();
+        assert_eq!((config.models.mask.len(), &*config.models.organs, &*config.models.depth), (2, OURS, "meter"));
     }
 
     #[test]
@@ -214,10 +247,13 @@ mod tests {
         for (text, parts) in [
             ("[stroe]\npath = 'x'", &["stroe", "did you mean `store`?"][..]),
             ("[api]\nlistn = '127.0.0.1:1'", &["listn", "did you mean `listen`?"]),
-            ("[harvester]", &["harvester", "expected one of `store`, `api`, `source`"]),
+            ("[harvester]", &["harvester", "expected one of `store`, `api`, `models`, `source`"]),
             ("[store]\npath = 5", &["path = 5", "integer", "expected"]),
             ("[api]\nlisten = 'here'", &["listen = 'here'", "address"]),
             ("[api]\nlisten = '0.0.0.0:8420'", &["api.listen", "loopback", "0.0.0.0:8420"]),
+            ("[models]\nmask = ['a', 'b', 'c']", &["models.mask", "at most two", "\"c\""]),
+            ("[models]\nmasks = ['a']", &["masks", "did you mean `mask`?"]),
+            ("[models]\ndepth = ['a']", &["depth", "string"]),
             ("[source]\nkind = 'camera'", &["camera", "`replay`"]),
             ("[source]\nkind = 'replay'\nsesion = 'x'", &["sesion", "did you mean `session`?"]),
             ("[source]\nkind = 'synthetic'\nplants = -1", &["-1", "expected u16"]),

@@ -3,23 +3,24 @@
 use std::num::NonZeroUsize;
 
 use demeter_frame::{Intrinsics, Pose, Rgb};
-use demeter_models::{ModelError, Organ2d, Runtime, RuntimeError, find_manifest};
+use demeter_models::{ModelError, RuntimeError};
 use demeter_recon::organs::ScaleSource;
-use demeter_recon::view::{self, Dropped, PlantView, Refused, ScaleError, View, ViewError};
+use demeter_recon::view::{self, DepthScale, Dropped, PlantView, Refused, ScaleError, View, ViewError};
 use glam::DVec2;
 
+use crate::config::ModelsConfig;
 use crate::error::CommandError;
+pub use crate::networks::Degraded;
+use crate::networks::{Networks, Scene};
 
-/// Name of the network's manifest.
-const NETWORK: &str = "organ2d";
 /// Longest side given to the network when the picture holds one plant alone, pixels: twice its usual, because a photo
 /// is not in a hurry and thin stems gain by it.
 pub const PHOTO_SIDE: u32 = 512;
 
-/// The network with what follows it.
+/// The networks with what follows them.
 #[derive(Debug)]
 pub struct Eye {
-    network: Organ2d,
+    networks: Networks,
 }
 
 /// Why there is no network.
@@ -93,16 +94,18 @@ pub struct Sight {
     pub dropped: Vec<Dropped>,
     /// Where metres come from.
     pub scale_source: ScaleSource,
+    /// Other people's networks that failed on it.
+    pub degraded: Vec<Degraded>,
 }
 
 impl Eye {
-    /// Loads ONNX Runtime and our network.
+    /// Loads ONNX Runtime, our network and those that the configuration names beside it. One of these that is missing or
+    /// refused is left out: see [`Eye::degraded`].
     ///
     /// # Errors
     /// [`EyeError`], whose message says how to mend it.
-    pub fn open(threads: NonZeroUsize) -> Result<Self, EyeError> {
-        let runtime = Runtime::load(None)?;
-        Ok(Self { network: Organ2d::open(&runtime, &find_manifest(NETWORK)?, threads)? })
+    pub fn open(config: &ModelsConfig, threads: NonZeroUsize) -> Result<Self, EyeError> {
+        Ok(Self { networks: Networks::open(config, threads)? })
     }
 
     /// The same, looking closer: [`PHOTO_SIDE`].
@@ -110,14 +113,20 @@ impl Eye {
     /// # Errors
     /// [`EyeError`] when the network does not take that size.
     pub fn closer(self) -> Result<Self, EyeError> {
-        Ok(Self { network: self.network.with_long_side(PHOTO_SIDE)? })
+        Ok(Self { networks: self.networks.with_long_side(PHOTO_SIDE)? })
     }
 
-    /// Name and SHA-256 of the network.
+    /// Name and SHA-256 of each network, ours first.
     #[must_use]
-    pub fn model(&self) -> (&str, &str) {
-        let manifest = self.network.model().manifest();
-        (&manifest.name, &manifest.sha256)
+    pub fn models(&self) -> Vec<(&str, &str)> {
+        let manifests = self.networks.models().into_iter().map(demeter_models::Model::manifest);
+        manifests.map(|manifest| (manifest.name.as_str(), manifest.sha256.as_str())).collect()
+    }
+
+    /// What is configured and could not be opened.
+    #[must_use]
+    pub fn degraded(&self) -> &[Degraded] {
+        &self.networks.degraded
     }
 
     /// Looks at a picture. With a place in the world the ground gives metres; without one the plants are put at 1 m.
@@ -130,28 +139,32 @@ impl Eye {
         camera: &Intrinsics,
         world_from_camera: Option<Pose>,
     ) -> Result<Sight, SightError> {
-        let maps = self.network.run(picture)?;
-        let (width, height) = maps.dist.dimensions();
-        let semantic = maps.semantic();
+        let Scene { semantic, dist, log_depth, divided, metric, scale: enlargement, degraded } =
+            self.networks.look(picture, camera)?;
+        let (width, height) = semantic.dimensions();
         let view = View {
             semantic: &semantic,
-            dist: &maps.dist,
-            log_depth: &maps.log_depth,
+            dist: &dist,
+            log_depth: &log_depth,
             intrinsics: camera.resized(width, height),
             world_from_camera,
         }
         .validated()?;
-        let scale = if world_from_camera.is_some() { view::ground_plane(&view)? } else { view::nominal(&view)? };
-        let (raster, regions) = view::instances(&view);
+        let scale = match (world_from_camera, metric) {
+            (Some(_), _) => view::ground_plane(&view)?,
+            (None, true) => DepthScale::METRIC,
+            (None, false) => view::nominal(&view)?,
+        };
+        let (raster, regions) = divided.map_or_else(|| view::instances(&view), |ids| view::divided(&view, &ids));
         let lifted = view::lift(&view, &raster, &regions, scale);
         let (plants, refused) = view::group(&view, &lifted.organs);
         let sights = plants.into_iter().map(|plant| plant.anchored(&view)).map(|plant| PlantSight {
             ground: plant.ground_position(&view),
             off_centre: plant.off_centre(&view),
-            bounds: enlarged(plant.bounds, maps.scale, picture.dimensions()),
+            bounds: enlarged(plant.bounds, enlargement, picture.dimensions()),
             plant,
         });
-        Ok(Sight { plants: sights.collect(), refused, dropped: lifted.dropped, scale_source: scale.source })
+        Ok(Sight { plants: sights.collect(), refused, dropped: lifted.dropped, scale_source: scale.source, degraded })
     }
 }
 

@@ -9,7 +9,7 @@ use demeter_frame::Intrinsics;
 use demeter_recon::world::Row;
 
 use crate::api::{Activity, State};
-use crate::config::SourceConfig;
+use crate::config::{ModelsConfig, SourceConfig};
 use crate::error::CommandError;
 use crate::eye::Eye;
 use crate::files;
@@ -24,13 +24,19 @@ const FRAMES_A_PLANT: usize = 4;
 /// Metres between synthetic plants, and their age from 0 (seedling) to 1 (full height): as `demeter synth session`.
 const SYNTHETIC_ROW: (f64, f64) = (0.35, 0.25);
 
-/// Runs the source to its end, or until `stop` is set; `activity` says how it goes.
+/// Runs the source through these networks to its end, or until `stop` is set; `activity` says how it goes.
 ///
 /// # Errors
 /// Only the store's: without it nothing may be acknowledged, so the program must end. Everything else stands on the
 /// page, where stored plants can still be seen.
-pub fn work(source: &SourceConfig, store: &Store, stop: &AtomicBool, activity: &Activity) -> Result<(), StoreError> {
-    let state = match run(source, store, stop) {
+pub fn work(
+    source: &SourceConfig,
+    models: &ModelsConfig,
+    store: &Store,
+    stop: &AtomicBool,
+    activity: &Activity,
+) -> Result<(), StoreError> {
+    let state = match run(source, models, store, stop) {
         Ok(state) => state,
         Err(WorkError::Store(error)) => return Err(error),
         Err(WorkError::Other(error)) => State::Failed(error.message),
@@ -56,14 +62,14 @@ impl From<CommandError> for WorkError {
     }
 }
 
-fn run(source: &SourceConfig, store: &Store, stop: &AtomicBool) -> Result<State, WorkError> {
+fn run(source: &SourceConfig, models: &ModelsConfig, store: &Store, stop: &AtomicBool) -> Result<State, WorkError> {
     let (mut source, manifest) = match source {
         SourceConfig::Replay { session } => replay(session)?,
         SourceConfig::Synthetic { species, plants, seed } => synthetic(species, *plants, *seed)?,
     };
     let species = files::species(&manifest.species)?;
     // One thread for the network: the other core decodes and fits.
-    let mut eye = Eye::open(NonZeroUsize::MIN).map_err(|error| CommandError::failed("network", &error))?;
+    let mut eye = Eye::open(models, NonZeroUsize::MIN).map_err(|error| CommandError::failed("network", &error))?;
     let run = Run { manifest: &manifest, species: &species, store, stop };
     let outcome = pipeline::run(&run, &mut *source, &mut eye, |progress| match progress {
         Progress::Frame => metrics::counter!("demeter_frames_total").increment(1),

@@ -10,6 +10,7 @@ use demeter_recon::model::{Plant, Species};
 use demeter_recon::organs::ScaleSource;
 use glam::DVec3;
 
+use crate::config::Config;
 use crate::describe::{Described, Encoding, describe};
 use crate::error::{CommandError, Exit, chain};
 use crate::eye::{Eye, PlantSight};
@@ -28,6 +29,9 @@ const MAX_PLANTS: usize = 64;
 pub struct Args {
     /// The photo, JPEG or PNG.
     image: PathBuf,
+    /// The configuration, whose `[models]` names the networks; without it /etc/demeter/demeter.toml where there is one.
+    #[arg(long)]
+    config: Option<PathBuf>,
     /// The species it shows.
     #[arg(long, default_value = "soybean")]
     species: String,
@@ -70,9 +74,11 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let Lens { camera, warning } = lens::of(&photo, &bytes, turned, args.calibration.as_deref(), args.hfov)?;
     let mut warnings: Vec<String> = warning.into_iter().collect();
 
-    let mut eye = Eye::open(NonZeroUsize::MIN).and_then(Eye::closer)?;
+    let config = Config::load(args.config.as_deref())?;
+    let mut eye = Eye::open(&config.models, NonZeroUsize::MIN).and_then(Eye::closer)?;
     let sight = eye.look(&photo, &camera, None).map_err(|error| CommandError::failed(error.name(), &error))?;
-    let mut seen = sight.plants;
+    warnings.extend(eye.degraded().iter().chain(&sight.degraded).map(ToString::to_string));
+    let (scale_source, mut seen) = (sight.scale_source, sight.plants);
     if seen.is_empty() {
         let organs = sight.refused.iter().map(|r| r.instances.len()).sum::<usize>();
         let why = sight.refused.first().map_or_else(|| "no organ large enough".into(), |r| r.reason.to_string());
@@ -92,7 +98,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let mut fitted = Vec::new();
     let mut failures: Vec<ReconstructError> = Vec::new();
     for sight in seen {
-        match fit(sight, &species, &camera) {
+        match fit(sight, &species, &camera, scale_source) {
             Ok(plant) => fitted.push(plant),
             Err(error) => {
                 warnings.push(format!("a plant could not be fitted: {}", chain(&error)));
@@ -113,7 +119,12 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     Ok(exit)
 }
 
-fn fit(sight: PlantSight, species: &Species, camera: &Intrinsics) -> Result<Fitted, ReconstructError> {
+fn fit(
+    sight: PlantSight,
+    species: &Species,
+    camera: &Intrinsics,
+    scale_source: ScaleSource,
+) -> Result<Fitted, ReconstructError> {
     let (stand_in, cut) = (sight.plant.stand_in, sight.plant.touches_border);
     // Without a pose the camera is taken to be level: up is up in the picture.
     let (mut fitted, mut cloud) = fit_organs(sight.plant.organs, species, DVec3::NEG_Y)?;
@@ -121,7 +132,7 @@ fn fit(sight: PlantSight, species: &Species, camera: &Intrinsics) -> Result<Fitt
     let camera_from_plant = std::mem::replace(&mut fitted.plant.world_from_plant, Pose::IDENTITY);
     let plant_from_camera = camera_from_plant.inverse();
     cloud.iter_mut().for_each(|p| *p = plant_from_camera.point(*p));
-    let mut described = describe(&fitted, species, &cloud, ScaleSource::None, Encoding::Compact)?;
+    let mut described = describe(&fitted, species, &cloud, scale_source, Encoding::Compact)?;
     described.report.camera = Some(Camera { intrinsics: *camera, camera_from_plant });
     let in_camera = Plant { world_from_plant: camera_from_plant, ..described.plant.clone() };
     let warnings = &mut described.report.warnings;

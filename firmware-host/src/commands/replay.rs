@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 use demeter_capture::{Pace, Replay, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::config::Config;
 use crate::error::{CommandError, Exit};
 use crate::eye::Eye;
 use crate::files;
@@ -24,6 +25,9 @@ pub struct Args {
     /// The store that plants go into; made when it is not there.
     #[arg(long, default_value = "demeter.sqlite")]
     db: PathBuf,
+    /// The configuration, whose `[models]` names the networks; without it /etc/demeter/demeter.toml where there is one.
+    #[arg(long)]
+    config: Option<PathBuf>,
     /// As fast as it goes, or as it was recorded.
     #[arg(long, value_enum, default_value_t = Speed::Max)]
     speed: Speed,
@@ -48,7 +52,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let manifest = source.manifest().clone();
     let species = files::species(&manifest.species)?;
     // One thread for the network: the other core decodes and fits.
-    let mut eye = Eye::open(NonZeroUsize::MIN)?;
+    let mut eye = Eye::open(&Config::load(args.config.as_deref())?.models, NonZeroUsize::MIN)?;
     let store = Store::open(&args.db)?;
     let bar = progress_bar(source.len_hint());
     let run = Run { manifest: &manifest, species: &species, store: &store, stop: &AtomicBool::new(false) };

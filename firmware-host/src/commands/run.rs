@@ -55,7 +55,8 @@ pub fn run(args: &Args, _output: &Output) -> Result<Exit, CommandError> {
         let worker = config.source.as_ref().map(|source| {
             // Before the first answer, so that nobody is told that there is no source.
             activity.set(State::Working);
-            let work = || worker::work(source, &store, &stop, &activity).inspect_err(|_| broken.notify_one());
+            let work =
+                || worker::work(source, &config.models, &store, &stop, &activity).inspect_err(|_| broken.notify_one());
             scope.spawn(work)
         });
         tracing::info!("store {}, page http://{address}", config.store.path.display());

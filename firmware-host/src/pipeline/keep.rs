@@ -16,14 +16,23 @@ use crate::store::{NewPlant, StoreError};
 
 /// What every plant of the run depends on besides its frames.
 pub(super) fn provenance(eye: &Eye) -> Value {
-    let (model, sha256) = eye.model();
-    json!({"program": env!("CARGO_PKG_NAME"), "version": env!("CARGO_PKG_VERSION"), "model": model, "sha256": sha256})
+    let mut models = eye.models().into_iter();
+    let (model, sha256) = models.next().unzip();
+    let mut provenance = json!({
+        "program": env!("CARGO_PKG_NAME"), "version": env!("CARGO_PKG_VERSION"), "model": model, "sha256": sha256
+    });
+    let others: Vec<_> = models.map(|(model, sha256)| json!({"model": model, "sha256": sha256})).collect();
+    if !others.is_empty() {
+        provenance["others"] = json!(others);
+    }
+    provenance
 }
 
 pub(super) struct Keeper<'a> {
     pub run: &'a Run<'a>,
     pub provenance: Value,
-    pub model: String,
+    /// Every network's SHA-256, ours first.
+    pub models: Vec<String>,
     pub outcome: Outcome,
 }
 
@@ -115,7 +124,7 @@ impl Keeper<'_> {
             time_trusted: false,
             position: Some(closed.position.extend(0.0)),
             geographic: None,
-            models: vec![self.model.clone()],
+            models: self.models.clone(),
             provenance,
             observations: closed.frames.iter().map(|(camera, seq)| (camera.0.clone(), *seq)).collect(),
             thumbnail: picture::png(&beside).ok(),

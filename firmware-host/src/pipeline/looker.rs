@@ -92,6 +92,10 @@ impl<'a> Looker<'a> {
             Ok(sight) => sight,
             Err(error) => return unseen(error.name(), chain(&error)),
         };
+        for degraded in &sight.degraded {
+            metrics::counter!("demeter_degraded_total").increment(1);
+            tracing::warn!("frame {}: {degraded}", frame.seq);
+        }
         let travelled = self.odometer.advance(&frame.camera, pose.translation.truncate());
         let seen = observations(sight, frame, rgb, &camera.intrinsics, pose);
         let (closed, misplaced) = self.tracker.frame(&key, travelled, seen);

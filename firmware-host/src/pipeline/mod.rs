@@ -106,7 +106,8 @@ pub fn run(
     let started = Instant::now();
     save_names(run, eye)?;
     let provenance = keep::provenance(eye);
-    let mut keeper = keep::Keeper { run, provenance, model: eye.model().1.to_owned(), outcome: Outcome::default() };
+    let models = eye.models().into_iter().map(|(_, sha256)| sha256.to_owned()).collect();
+    let mut keeper = keep::Keeper { run, provenance, models, outcome: Outcome::default() };
     let joined = std::thread::scope(|scope| {
         let (to_looker, frames) = sync_channel(FRAMES_WAITING);
         let (to_keeper, sights) = sync_channel(PLANTS_WAITING);
@@ -141,6 +142,10 @@ fn save_names(run: &Run<'_>, eye: &Eye) -> Result<(), StoreError> {
         cameras: run.manifest.cameras.iter().map(|camera| (camera.id.0.clone(), calibration(camera))).collect(),
     })?;
     run.store.save_species(run.species)?;
-    let (name, sha256) = eye.model();
-    run.store.save_model(sha256, name)
+    for degraded in eye.degraded() {
+        tracing::warn!("{degraded}");
+        let detail = serde_json::json!({"role": degraded.role, "why": degraded.why});
+        run.store.save_event(jiff::Timestamp::now(), "degraded", &detail)?;
+    }
+    eye.models().into_iter().try_for_each(|(name, sha256)| run.store.save_model(sha256, name))
 }

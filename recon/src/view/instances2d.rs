@@ -62,6 +62,16 @@ pub fn instances(view: &View<'_>) -> (Instances, Vec<Region>) {
     grid.table(&class, &label, last)
 }
 
+/// The instances that a network divided already: `ids` of the view's size, 0 for none, each of one class. They are
+/// numbered anew; pixels without a class belong to none.
+#[must_use]
+pub fn divided(view: &View<'_>, ids: &Instances) -> (Instances, Vec<Region>) {
+    let class = view.semantic.as_raw();
+    let label: Vec<u32> = ids.iter().map(|&id| id.into()).collect();
+    let count = label.iter().copied().max().unwrap_or(0);
+    Grid::of(view, class).table(class, &label, count)
+}
+
 const LEAF: u8 = Semantic::Leaf as u8;
 const STEM: u8 = Semantic::Stem as u8;
 const MAIN: u8 = Semantic::MainStem as u8;

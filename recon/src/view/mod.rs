@@ -23,7 +23,7 @@ use demeter_frame::{CameraError, Depth, Intrinsics, Mask, Pose};
 use image::GrayImage;
 
 pub use group::{GroupError, PlantView, Refused, group};
-pub use instances2d::{Region, instances};
+pub use instances2d::{Region, divided, instances};
 pub use lift::{DropReason, Dropped, Lifted, LiftedOrgan, lift};
 pub use overlay::overlay;
 pub use scale::{DepthScale, ScaleError, ground_plane, nominal};

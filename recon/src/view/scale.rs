@@ -35,6 +35,9 @@ pub struct DepthScale {
 }
 
 impl DepthScale {
+    /// Of logarithms of metres.
+    pub const METRIC: Self = Self { factor: 1.0, exponent: 1.0, source: ScaleSource::MetricModel, spread: 0.0 };
+
     /// Depth along the camera's axis from its logarithm; `None` where that makes no depth.
     #[must_use]
     pub(super) fn depth(&self, log_depth: f64) -> Option<f64> {
