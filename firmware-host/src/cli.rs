@@ -6,7 +6,9 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::commands::{decode, doctor, edit, eval, fit, import, learn, photo, plants, replay, run, species, synth};
+use crate::commands::{
+    decode, doctor, edit, eval, fit, import, learn, models, photo, plants, replay, run, species, synth,
+};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
@@ -37,6 +39,8 @@ enum Command {
     Import(import::Args),
     /// List, show, export and import species.
     Species(species::Args),
+    /// List, install, verify and time the networks.
+    Models(models::Args),
     /// Check this box: store, models, ONNX Runtime, disk, and how to mend what is missing.
     Doctor(doctor::Args),
     /// Reconstruct the plants of a photo.
@@ -61,6 +65,7 @@ impl Command {
             Self::Edit(args) => edit::run(args, output),
             Self::Import(args) => import::run(args, output),
             Self::Species(args) => species::run(args, output),
+            Self::Models(args) => models::run(args, output),
             Self::Doctor(args) => doctor::run(args, output),
             Self::Photo(args) => photo::run(args, output),
             Self::Replay(args) => replay::run(args, output),

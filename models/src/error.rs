@@ -74,7 +74,7 @@ pub enum ModelError {
         found: String,
     },
     /// A graph is not of the layout that its manifest or its user says.
-    #[error("layout {layout:?}: expected {expected}, found {found}")]
+    #[error("layout {layout}: expected {expected}, found {found}")]
     Layout {
         /// The layout.
         layout: crate::Layout,
@@ -150,7 +150,7 @@ pub enum ModelError {
         path: PathBuf,
     },
     /// A detector without one class that is an organ.
-    #[error("model {name}: expected `classes` to say which of its classes are organs, found none")]
+    #[error("model {name}: expected `classes` to say which of its classes are organs, found none; --classes says it")]
     Classes {
         /// The model's name.
         name: String,

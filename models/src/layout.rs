@@ -1,3 +1,4 @@
+use serde::de::IntoDeserializer;
 use serde::{Deserialize, Serialize};
 
 use crate::signature::{Role, Signature, f32s, i64s};
@@ -35,6 +36,21 @@ pub enum Layout {
     Sam2Decoder,
     /// U²-Net and u2netp: saliency.
     U2net,
+}
+
+/// As manifests spell it.
+impl std::fmt::Display for Layout {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.serialize(f)
+    }
+}
+
+impl std::str::FromStr for Layout {
+    type Err = serde::de::value::Error;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::deserialize(text.into_deserializer())
+    }
 }
 
 /// The layouts of others. -1 is a side that the graph may leave open; a role's first name is what adapters call it.

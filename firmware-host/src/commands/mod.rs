@@ -7,6 +7,7 @@ pub mod eval;
 pub mod fit;
 pub mod import;
 pub mod learn;
+pub mod models;
 pub mod photo;
 pub mod plants;
 pub mod replay;
