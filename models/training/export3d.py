@@ -12,8 +12,8 @@ from network3d import CLASSES, INPUTS
 
 PINNED_POINTS, PINS = 1500, 60
 # Input -> length of its second dimension; without one it is a vector.
-COLUMNS = {"local": pyramid.LOCAL, "up": pyramid.ABOVE} | {f"{kind}{level}": pyramid.NEIGHBOURS
-    for kind in ("below", "beside") for level in (1, 2, 3)}
+COLUMNS = {"local": pyramid.LOCAL, "up": pyramid.ABOVE}
+COLUMNS |= {f"{kind}{level}": pyramid.NEIGHBOURS for kind in ("below", "beside") for level in (1, 2, 3)}
 OUTPUTS = {"semantic": CLASSES, "boundary": 1}
 
 
@@ -39,20 +39,17 @@ def port_shape(name):
 
 
 def pinned_points():
-    """Point i: a spiral with leaves, of whole numbers until the last division, so the same everywhere."""
-    i = np.arange(PINNED_POINTS)
-    return np.column_stack([(i * i * 7 + 3 * i) % 257, (i * 101) % 263, (i * i + 29 * i) % 509]) / 509
+    """Point i lies at the fractions of i i times three irrational numbers: no two distances agree, so that nearest
+    neighbours are the same everywhere."""
+    i = np.arange(PINNED_POINTS, dtype=float)
+    return np.column_stack([(i * i * k) % 1 for k in (0.618033988749895, 0.7548776662466927, 0.5698402909980532)])
 
 
 def write_pins(network, example, path):
     """What PyTorch computes in single precision at some points."""
     with torch.no_grad():
         outputs = dict(zip(OUTPUTS, network.eval()(**example)))
-    random = np.random.default_rng(0)
-    pins = []
-    for _ in range(PINS):
-        i = int(random.integers(PINNED_POINTS))
-        pins += [{"output": name, "at": [i, c], "value": float(output[i, c])}
-                 for name, output in outputs.items() for c in range(output.shape[1])]
+    asked = np.random.default_rng(0).integers(PINNED_POINTS, size=PINS)
+    pins = [{"at": int(i)} | {name: output[i].tolist() for name, output in outputs.items()} for i in asked]
     lines = ",\n  ".join(json.dumps(pin) for pin in pins)
     path.write_text(f'{{"points": {PINNED_POINTS}, "pins": [\n  {lines}\n]}}\n')

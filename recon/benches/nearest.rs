@@ -1,10 +1,11 @@
-//! Nearest neighbours on a plant's points, grown by decades: building the search, and one query a point.
+//! Nearest neighbours on a plant's points, grown by decades: building the search, and one query a point; and the
+//! pyramid that a network over points takes.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use demeter_recon::nearest::Nearest;
-use demeter_recon::species;
 use demeter_recon::world::{grow, labelled_cloud, seeded};
+use demeter_recon::{pyramid, species};
 
 fn by_points(c: &mut Criterion) {
     let soybean = species::shipped("soybean").unwrap().unwrap();
@@ -21,6 +22,15 @@ fn by_points(c: &mut Criterion) {
         let search = Nearest::of(&points);
         group.bench_with_input(BenchmarkId::new("query", count), &queries, |b, queries| {
             b.iter(|| queries.iter().filter_map(|p| search.one(*p)).map(|n| n.distance_squared).sum::<f64>());
+        });
+    }
+    group.finish();
+    let mut group = c.benchmark_group("pyramid");
+    group.sample_size(10);
+    for count in [4_096, 16_384, 65_536] {
+        let points = labelled_cloud(&plant, &soybean, count, 0.001, &mut seeded(2)).unwrap().cloud.points;
+        group.bench_with_input(BenchmarkId::from_parameter(count), &points, |b, points| {
+            b.iter(|| pyramid::of(points).unwrap());
         });
     }
     group.finish();
