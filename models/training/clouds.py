@@ -20,6 +20,9 @@ LEAF = 0
 # Delta of the truncated inverse distance, as a share of the bounding box's diagonal (spec/reconstruction.md).
 DELTA = 0.01
 TYPES = {"float": "<f4", "double": "<f8", "int": "<i4", "uint": "<u4", "uchar": "u1"}
+# Median radius of stems to which they are thinned or thickened, as a share of the diagonal: of a maize plant with ten
+# leaves and of a seedling with two.
+THIN_STEM, THICK_STEM = 0.003, 0.025
 # Points of one sample at which the network is asked while it learns.
 ASKED = 4096
 # Cells of level 1 that a sample has at least to have when it has fewer than in use.
@@ -138,9 +141,12 @@ def spoiled(cloud, random):
     weight = np.ones(len(points))
     if random.random() < 0.6:
         # Seedlings have thick stems for their size, the generators' plants are grown up and thin.
-        thicker = np.exp(random.uniform(np.log(0.7), np.log(5)))
+        stems = sem != LEAF
+        radius = np.median(np.linalg.norm(points - axis, axis=1)[stems]) if stems.any() else 1.0
+        wanted = np.exp(random.uniform(np.log(THIN_STEM), np.log(THICK_STEM)))
+        thicker = np.clip(wanted / max(radius, 1e-6), 0.5, 5)
         points = axis + (points - axis) * thicker
-        weight[sem != LEAF] = thicker
+        weight[stems] = thicker
     stretch = np.exp(random.normal(0, 0.12, 3))
     points = turned(points * stretch, random, abs(random.normal(0, 0.12)))
     if random.random() < 0.5:
