@@ -28,8 +28,9 @@ impl std::fmt::Display for Port {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DataSet {
-    /// Images in it.
-    pub images: u64,
+    /// Images, clouds or other samples in it.
+    #[serde(alias = "images")]
+    pub samples: u64,
     /// Seed it was made with.
     pub seed: u64,
     /// Program that made it, with its version.
