@@ -1,5 +1,5 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup build demo check fmt bench evaluation train species
+.PHONY: setup build demo check fmt bench evaluation train species layouts
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
 IMAGES := .cache/training/images
@@ -44,3 +44,7 @@ train: build
 # Every species of recon/species from ../shared and generated plants: ten minutes, most of them growing the plants.
 species: build
 	tools/learn-species.sh
+
+# Real models of other people for tests/tests/other_models.rs: 230 MB into .cache/layouts, by way of 6 GB of PyTorch.
+layouts:
+	@tools/layouts.sh
