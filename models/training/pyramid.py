@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 # As in recon/src/pyramid.rs, where they are explained.
-FINEST_SHARE, GROWTH, MOST_CELLS, NEIGHBOURS, ABOVE, LEVELS = 0.004, 2**0.25, 4096, 16, 3, 3
+FINEST_SHARE, GROWTH, MOST_CELLS, MOST_ATTENDING, NEIGHBOURS, ABOVE, LEVELS = 0.004, 2**0.25, 4096, 512, 16, 3, 3
 LOCAL = 6
 
 
@@ -23,11 +23,14 @@ def of(points, queries=None, most_cells=MOST_CELLS):
         cell *= GROWTH
     origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
     levels, parents, below = [], [], (points - origin) / cell
-    for shift in range(LEVELS + 1):
-        _, first, parent = np.unique(packed(keys >> min(shift, 1)), return_index=True, return_inverse=True)
+    for level in range(LEVELS + 1):
+        keys = keys >> min(level, 1)
+        while level == LEVELS and len(np.unique(packed(keys))) > MOST_ATTENDING:
+            keys = keys >> 1
+        _, first, parent = np.unique(packed(keys), return_index=True, return_inverse=True)
         count = np.bincount(parent)
         below = np.stack([np.bincount(parent, below[:, k]) / count for k in range(3)], 1)
-        keys = (keys >> min(shift, 1))[first]
+        keys = keys[first]
         levels.append(below)
         parents.append(parent)
     out = SimpleNamespace(points0=levels[0])

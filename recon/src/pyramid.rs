@@ -16,6 +16,9 @@ const FINEST_SHARE: f64 = 0.004;
 const GROWTH: f64 = 1.189_207_115_002_721;
 /// Most filled cells of level 1. Time on one core is nearly proportional; 4,096 keep a call below 150 ms.
 const MOST_CELLS: usize = 4096;
+/// Most filled cells of level 3, all of which look at all: time and memory go with the square. More than plants fill,
+/// whose surfaces leave most of space empty; clouds of strays fill more.
+const MOST_ATTENDING: usize = 512;
 /// Spreads below this, in squared cells, count as none.
 const LEAST_SPREAD: f64 = 1e-12;
 
@@ -37,7 +40,7 @@ pub enum PyramidError {
 
 /// The pyramid of `points` (metres or any unit, z up); time and memory are linear in their number.
 ///
-/// Level 0 has cubic cells of half the edge of level 1, level 2 of twice and level 3 of four times it; a filled cell's
+/// Level 0 has cubic cells of half the edge of level 1, level 2 of twice and level 3 of four times it (or eight, or more, until at most 512 are filled); a filled cell's
 /// point is the mean of the points below that it holds. The cells of level 1 are the smallest that leave at most 4,096
 /// filled, so that neither the number of points nor their density changes what the network sees, but not smaller than
 /// 0.4 % of the cloud's diagonal.
@@ -53,7 +56,7 @@ pub fn of(points: &[DVec3]) -> Result<PointPyramid, PyramidError> {
     let size = diagonal(points).filter(|size| *size > 0.0);
     let mut edge = size.unwrap_or(1.0) * FINEST_SHARE;
     let mut keys = keys(points, low, edge);
-    while filled(&keys) > MOST_CELLS {
+    while distinct(keys.iter().copied().map(halved)) > MOST_CELLS {
         edge *= GROWTH;
         keys = self::keys(points, low, edge);
     }
@@ -61,9 +64,9 @@ pub fn of(points: &[DVec3]) -> Result<PointPyramid, PyramidError> {
     let all: Vec<DVec3> = points.iter().map(|p| (*p - foot) / edge).collect();
 
     let zeroth = Cells::of(&keys, &all);
-    let first = zeroth.coarser();
-    let second = first.coarser();
-    let third = second.coarser();
+    let first = zeroth.coarser(MOST_CELLS);
+    let second = first.coarser(MOST_CELLS);
+    let third = second.coarser(MOST_ATTENDING);
     let search = [&zeroth, &first, &second, &third].map(|cells| Nearest::of(&cells.means));
     let level = |cells: &Cells, k: usize, parent: &[i64]| PyramidLevel {
         points: single(&cells.means),
@@ -93,9 +96,8 @@ fn halved(key: [u32; 3]) -> [u32; 3] {
     key.map(|x| x >> 1)
 }
 
-/// How many cells of level 1 hold one of level 0's `keys`.
-fn filled(keys: &[[u32; 3]]) -> usize {
-    let mut cells: Vec<[u32; 3]> = keys.iter().copied().map(halved).collect();
+fn distinct(keys: impl Iterator<Item = [u32; 3]>) -> usize {
+    let mut cells: Vec<[u32; 3]> = keys.collect();
     cells.sort_unstable();
     cells.dedup();
     cells.len()
@@ -123,9 +125,12 @@ impl Cells {
         cells
     }
 
-    /// The next level: eight cells make one.
-    fn coarser(&self) -> Self {
-        let keys: Vec<[u32; 3]> = self.keys.iter().copied().map(halved).collect();
+    /// The next level: eight cells make one, again and again until at most `most` are filled.
+    fn coarser(&self, most: usize) -> Self {
+        let mut keys: Vec<[u32; 3]> = self.keys.iter().copied().map(halved).collect();
+        while distinct(keys.iter().copied()) > most {
+            keys.iter_mut().for_each(|key| *key = halved(*key));
+        }
         Self::of(&keys, &self.means)
     }
 }
@@ -237,6 +242,16 @@ mod tests {
         // A level sheet is planar with a vertical normal.
         let flat = made.local.iter().filter(|local| local[1] > 0.5 && local[2] < 1e-6 && local[3] > 0.999);
         assert!(flat.count() * 10 > first.len() * 8);
+    }
+
+    #[test]
+    fn strays_all_over_space_do_not_swell_the_level_that_attends() {
+        let strays: Vec<DVec3> = (0..20_000)
+            .map(|i| DVec3::new(0.618_033, 0.754_877, 0.569_84).map(|k| (f64::from(i) * k).fract()))
+            .collect();
+        let made = of(&strays).unwrap();
+        assert!(made.levels[0].points.len() > MOST_CELLS / 8);
+        assert!((MOST_ATTENDING / 16..=MOST_ATTENDING).contains(&made.levels[2].points.len()));
     }
 
     #[test]
