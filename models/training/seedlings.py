@@ -63,7 +63,7 @@ def rib(random, start, azimuth, inclination, length, bend):
     its tip, sometimes sharply: points [s,3] and their frames (tangent, to the right, to the upper side)."""
     s = np.linspace(0, 1, ALONG)
     angle = inclination + bend * s ** random.uniform(0.7, 2.5)
-    if random.random() < 0.2:
+    if random.random() < 0.35:
         angle = angle + random.normal(0, 0.7) / (1 + np.exp((random.uniform(0.2, 0.9) - s) * 40))
     around = azimuth + random.normal(0, 0.4) * s
     out = np.stack([np.cos(around), np.sin(around), np.zeros(ALONG)], 1)
@@ -108,7 +108,7 @@ def grass(random):
     plant.add(MAIN_STEM, tube(s[:, None] * UP, radius * taper))
     azimuth = random.uniform(0, 2 * np.pi)
     for k, height in enumerate(heights):
-        young = k == leaves - 1 and leaves > 1
+        young = leaves > 1 and (k == leaves - 1 or k == leaves - 2 and random.random() < 0.3)
         azimuth += np.pi + random.normal(0, 0.35)
         out = np.array([np.cos(azimuth), np.sin(azimuth), 0])
         at = radius * np.interp(height, s, taper) * random.uniform(0.8, 1.1)
@@ -121,6 +121,9 @@ def grass(random):
         width = np.maximum(outline(random, True) * widest, wrapped * np.clip(1 - s * random.uniform(2, 12), 0, 1))
         opening = random.uniform(0.3, 3.0) if young else random.uniform(0.02, 0.4)
         curvature = np.exp(-s / opening) / at + random.uniform(0, 1.5) / max(widest, 1e-3)
+        if random.random() < 0.3:
+            # Thin dry tips and edges roll up.
+            curvature = curvature + s ** random.uniform(1, 4) * random.uniform(1, 6) / max(widest, 1e-3)
         ribs = rib(random, out * at + UP * height, azimuth, inclination, length, bend)
         plant.add(BLADE, blade(random, ribs, np.maximum(width, 0.002), curvature))
     return plant
@@ -173,7 +176,7 @@ def _leaf(random, plant, height, azimuth, size, radius, compound, sessile):
 
 def leant(points, random):
     """The plant along a bent line in place of the vertical: it leans, or lies and rises again."""
-    lean = abs(random.normal(0, 0.15)) + (random.uniform(0, 1.2) if random.random() < 0.15 else 0)
+    lean = abs(random.normal(0, 0.15)) + (random.uniform(0, 1.5) if random.random() < 0.25 else 0)
     z = np.linspace(0, max(1.0, points[:, 2].max()), 60)
     angle = lean + random.normal(0, 0.3) * z + random.normal(0, 0.1) * np.sin(z * random.uniform(2, 9))
     if lean > 0.5:
