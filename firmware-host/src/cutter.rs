@@ -20,7 +20,7 @@ const MIN_PLANT: f64 = 0.5;
 #[derive(Debug)]
 pub(crate) enum Cutter {
     /// What stands out.
-    Salient(U2net),
+    Salient(Box<U2net>),
     /// What is at points of our network's organs.
     Sam(Box<(SamEncoder, SamDecoder)>),
 }
@@ -29,7 +29,7 @@ impl Cutter {
     /// Opens one network, U²-Net, or two, SAM's encoder and decoder; `None` for none.
     pub(crate) fn open(runtime: &Runtime, names: &[String], threads: NonZeroUsize) -> Result<Option<Self>, ModelError> {
         Ok(match names {
-            [one] => Some(Self::Salient(U2net::open(runtime, &find_manifest(one)?, threads)?)),
+            [one] => Some(Self::Salient(Box::new(U2net::open(runtime, &find_manifest(one)?, threads)?))),
             [encoder, decoder] => Some(Self::Sam(Box::new((
                 SamEncoder::open(runtime, &find_manifest(encoder)?, threads)?,
                 SamDecoder::open(runtime, &find_manifest(decoder)?, threads)?,

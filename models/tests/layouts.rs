@@ -2,10 +2,12 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod installed;
+mod pictures;
 
 use demeter_frame::{Rgb, Semantic};
 use demeter_models::{DepthMap, DepthNetwork, Instance, Layout, Manifest, OrganNetwork, SamDecoder, SamEncoder, U2net};
-use installed::{ONE, examine, installed, ramps, runtime};
+use installed::{ONE, examine, installed, runtime};
+use pictures::ramps;
 
 fn depth(name: &str, layout: Option<Layout>, image: &Rgb) -> DepthMap {
     let (_folder, path) = installed(name, layout);

@@ -2,12 +2,14 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod installed;
+mod pictures;
 
 use demeter_frame::{Rgb, Semantic};
 use demeter_models::{
     Candidate, DepthNetwork, Layout, Manifest, ModelError, OrganNetwork, SamDecoder, SamEncoder, U2net, find_manifest,
 };
-use installed::{ONE, examine, fixture, installed, ramps, runtime};
+use installed::{ONE, examine, fixture, installed, runtime};
+use pictures::ramps;
 
 #[test]
 fn ports_of_no_layout_are_refused_and_said() {

@@ -3,11 +3,12 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use demeter_models::{Organ2d, Runtime, find_manifest};
+use demeter_models::Runtime;
 use serde::Serialize;
 
-use crate::config::Config;
+use crate::config::{Config, ModelsConfig};
 use crate::error::{CommandError, Exit, chain};
+use crate::eye::Eye;
 use crate::files;
 use crate::output::Output;
 use crate::store::{Reader, StoreError};
@@ -68,6 +69,7 @@ impl Trouble {
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let config = Config::load(args.config.as_deref());
     let store = args.db.clone().or(config.as_ref().ok().map(|config| config.store.path.clone()));
+    let models = config.as_ref().map_or_else(|_| ModelsConfig::default(), |config| config.models.clone());
     let config =
         config.map_err(|error| Trouble::new(&error, "correct the line, or remove it: every key has a default"));
     let mut checks = vec![Check::new("configuration", config.map(|config| format!("page on {}", config.api.listen)))];
@@ -76,11 +78,11 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         checks.push(Check::new("disk", check_disk(&path)));
     }
     let runtime = Runtime::load(None);
-    let organs = runtime.as_ref().ok().map(|runtime| Check::new("network organ2d", check_organ2d(runtime)));
+    let networks = runtime.as_ref().ok().map(|_| Check::new("networks", check_networks(&models)));
     let library = runtime.map(|runtime| format!("{}, {}", runtime.library().display(), runtime.build_info()));
     let mend = "run tools/fetch-onnxruntime.sh, or point DEMETER_ONNXRUNTIME to libonnxruntime.so";
     checks.push(Check::new("ONNX Runtime", library.map_err(|error| Trouble::new(&error, mend))));
-    checks.extend(organs);
+    checks.extend(networks);
     checks.push(Check::new("species", check_species()));
 
     if output.json {
@@ -122,13 +124,15 @@ fn check_disk(store: &Path) -> Result<String, Trouble> {
     if free < MIN_FREE { Err(Trouble { found, mend: "free at least 1 GiB".into() }) } else { Ok(found) }
 }
 
-fn check_organ2d(runtime: &Runtime) -> Result<String, Trouble> {
+/// Ours and those that `[models]` names. Opening one verifies its file's hash, its inputs and its outputs.
+fn check_networks(config: &ModelsConfig) -> Result<String, Trouble> {
     let mend = "install the models folder beside the program, or point DEMETER_MODELS to it";
-    let manifest = find_manifest("organ2d").map_err(|error| Trouble::new(&error, mend))?;
-    // Opening verifies the file's hash, its inputs and its outputs.
-    Organ2d::open(runtime, &manifest, NonZeroUsize::MIN)
-        .map_err(|error| Trouble::new(&error, "install the file that the manifest describes"))?;
-    Ok(manifest.display().to_string())
+    let eye = Eye::open(config, NonZeroUsize::MIN).map_err(|error| Trouble::new(&error, mend))?;
+    if let Some(degraded) = eye.degraded().first() {
+        let mend = "`demeter models list` shows what is installed, `demeter models install` takes a file in";
+        return Err(Trouble { found: degraded.to_string(), mend: mend.into() });
+    }
+    Ok(eye.models().into_iter().map(|(name, _)| name).collect::<Vec<_>>().join(", "))
 }
 
 fn check_species() -> Result<String, Trouble> {

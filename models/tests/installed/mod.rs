@@ -3,7 +3,6 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use demeter_frame::Rgb;
 use demeter_models::{Candidate, Layout, ModelError, Runtime};
 use tempfile::TempDir;
 
@@ -26,11 +25,4 @@ pub(crate) fn installed(name: &str, layout: Option<Layout>) -> (TempDir, PathBuf
     let folder = tempfile::tempdir().unwrap();
     let path = examine(name, layout).unwrap().install(folder.path(), false).unwrap();
     (folder, path)
-}
-
-/// A picture whose colours are a ramp to the right, one down and a pattern.
-pub(crate) fn ramps(width: u32, height: u32) -> Rgb {
-    Rgb::from_fn(width, height, |x, y| {
-        image::Rgb([(x * 255 / (width - 1)) as u8, (y * 255 / (height - 1)) as u8, ((x + y) % 200) as u8])
-    })
 }
