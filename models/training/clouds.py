@@ -59,17 +59,16 @@ def axis_points(points, organ, kind):
         if len(own) < 20:
             continue
         centred = points[own] - points[own].mean(0)
-        along = centred @ np.linalg.eigh(centred.T @ centred)[1][:, 2]
+        direction = np.linalg.eigh(centred.T @ centred)[1][:, 2]
+        along = centred @ direction
         own, along = own[np.argsort(along)], np.sort(along)
         window = np.ptp(along) / 30
         first, last = np.searchsorted(along, along - window), np.searchsorted(along, along + window, "right")
-        sums = np.concatenate([np.zeros((1, 3)), np.cumsum(points[own], 0)])
-        level = np.concatenate([[0.0], np.cumsum(along)])
-        n = (last - first)[:, None]
-        direction = centred.T @ centred
-        direction = np.linalg.eigh(direction)[1][:, 2]
-        # The window's middle differs from the point at an end of the stem; shifted along the axis to its height.
-        axis[own] = (sums[last] - sums[first]) / n + (along[:, None] - (level[last] - level[first])[:, None] / n) * direction
+        sums = np.cumsum(np.column_stack([points[own], along]), 0)
+        sums = np.concatenate([np.zeros((1, 4)), sums])
+        mean = (sums[last] - sums[first]) / (last - first)[:, None]
+        # At an end of the stem the window's middle lies further in: it is moved along the axis to the point's height.
+        axis[own] = mean[:, :3] + (along - mean[:, 3])[:, None] * direction
     return axis
 
 
@@ -153,7 +152,8 @@ def spoiled(cloud, random):
         # Leaves and stems wave: smooth displacement with a wavelength of some tenths of the plant.
         for _ in range(2):
             wave = random.normal(0, 1, 3) * random.uniform(4, 14)
-            points = points + np.sin(points @ wave + random.uniform(0, 6.3))[:, None] * random.normal(0, 0.12, 3) / np.linalg.norm(wave)
+            phase, reach = random.uniform(0, 6.3), random.normal(0, 0.12, 3) / np.linalg.norm(wave)
+            points = points + np.sin(points @ wave + phase)[:, None] * reach
     if random.random() < 0.3:
         # A lying, leaning or bent plant.
         height = points[:, 2] - points[:, 2].min()

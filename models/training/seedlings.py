@@ -83,8 +83,8 @@ def blade(random, ribs, width, curvature):
     bent = np.clip(u * curvature[:, None], -np.pi, np.pi)
     ratio = np.where(np.abs(bent) > 1e-6, bent, 1e-6)
     sideways, inwards = u * np.sin(ratio) / ratio, u * (1 - np.cos(ratio)) / ratio
-    wave = random.normal(0, 0.04) * np.sin(s * random.uniform(6, 30) + random.uniform(0, 6))[:, None] * np.abs(u)
-    return line[:, None] + sideways[:, :, None] * right[:, None] + (inwards + wave * 4)[:, :, None] * upper[:, None]
+    wave = random.normal(0, 0.16) * np.sin(s * random.uniform(6, 30) + random.uniform(0, 6))[:, None] * np.abs(u)
+    return line[:, None] + sideways[:, :, None] * right[:, None] + (inwards + wave)[:, :, None] * upper[:, None]
 
 
 def outline(random, slim):
@@ -92,8 +92,7 @@ def outline(random, slim):
     s = np.linspace(0, 1, ALONG)
     widest = random.uniform(0.25, 0.6)
     power = random.uniform(0.5, 1.2) if slim else random.uniform(0.7, 1.4)
-    shape = np.sin(np.pi * s ** (np.log(0.5) / np.log(widest))) ** power
-    return shape
+    return np.sin(np.pi * s ** (np.log(0.5) / np.log(widest))) ** power
 
 
 def grass(random):

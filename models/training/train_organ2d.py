@@ -101,7 +101,8 @@ def main():
         run.resume(checkpoint)
     if run.seconds < args.minutes * 60:
         batches = torch.utils.data.DataLoader(samples(run.step * BATCH), BATCH, num_workers=1, prefetch_factor=4)
-        run.train(batches, lambda batch: [losses(run.network, batch)], args.minutes, 20 if args.smoke else endless, checkpoint)
+        most_steps = 20 if args.smoke else endless
+        run.train(batches, lambda batch: [losses(run.network, batch)], args.minutes, most_steps, checkpoint)
     network = run.average.to(memory_format=torch.contiguous_format)
     provenance = {
         "command": "models/training/" + shlex.join([pathlib.Path(sys.argv[0]).name, *sys.argv[1:]]),
