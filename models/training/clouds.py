@@ -73,7 +73,7 @@ def axis_points(points, organ, kind):
 
 
 class Clouds:
-    """The clouds of one folder; the last 3 % of them are held out."""
+    """The clouds of one folder; every 33rd of them is held out."""
 
     def __init__(self, folder, cache):
         self.folder = pathlib.Path(folder)

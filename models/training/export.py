@@ -24,5 +24,5 @@ def write_manifest(path, version, normalisation, inputs, outputs, provenance):
         f'[provenance]\ncommand = {json.dumps(provenance["command"])}\nseed = {provenance["seed"]}\n'
         f'steps = {provenance["steps"]}\nprogram = {json.dumps(provenance["program"])}\n'
         f"data = [\n{data}\n]\n\n"
-        f"# On the last 3 % of each data set, which were not trained on.\n[provenance.figures]\n{figures}\n"
+        f"# On the 3 % of each data set that were not trained on.\n[provenance.figures]\n{figures}\n"
     )
