@@ -8,14 +8,14 @@ import torch
 from export import write_manifest
 
 PINNED_HEIGHT, PINNED_WIDTH, PINS_A_CHANNEL = 64, 96, 9
-INPUTS = {"image": 3}
-OUTPUTS = {"sem": 4, "dist": 1, "depth": 1}
+INPUTS = {"image": [3, -1, -1]}
+OUTPUTS = {"sem": [4, -1, -1], "dist": [1, -1, -1], "depth": [1, -1, -1], "camera": [6]}
 
 
 def write(network, folder, version, provenance):
     """organ2d.onnx, organ2d.toml and organ2d.pins.json in `folder`."""
     write_onnx(network, folder / "organ2d.onnx")
-    ports = lambda them: [(name, [-1, channels, -1, -1], "f32") for name, channels in them.items()]
+    ports = lambda them: [(name, [-1, *sides], "f32") for name, sides in them.items()]
     normalisation = "inside the graph: give RGB in 0..1, sides multiples of 16"
     write_manifest(folder / "organ2d.toml", version, normalisation, ports(INPUTS), ports(OUTPUTS), provenance)
     write_pins(network, folder / "organ2d.pins.json")
@@ -23,7 +23,9 @@ def write(network, folder, version, provenance):
 
 def write_onnx(network, path):
     """Opset 17; n, h and w are the caller's. Batch normalisation is folded into the convolutions."""
-    axes = {name: {0: "n", 2: "h", 3: "w"} for name in INPUTS | OUTPUTS}
+    axes = {name: {0: "n"} for name in INPUTS | OUTPUTS}
+    for name in ("image", "sem", "dist", "depth"):
+        axes[name] |= {2: "h", 3: "w"}
     torch.onnx.export(
         network.eval(), torch.rand(1, 3, PINNED_HEIGHT, PINNED_WIDTH), str(path), opset_version=17,
         input_names=list(INPUTS), output_names=list(OUTPUTS), dynamic_axes=axes,
@@ -44,8 +46,8 @@ def write_pins(network, path):
     pins = []
     for name, output in zip(OUTPUTS, outputs):
         for c in range(output.shape[1]):
-            for _ in range(PINS_A_CHANNEL):
-                y, x = int(random.integers(PINNED_HEIGHT)), int(random.integers(PINNED_WIDTH))
-                pins.append({"output": name, "at": [c, y, x], "value": float(output[0, c, y, x])})
+            for _ in range(PINS_A_CHANNEL if output.ndim == 4 else 1):
+                at = [c, *(int(random.integers(side)) for side in output.shape[2:])]
+                pins.append({"output": name, "at": at, "value": float(output[(0, *at)])})
     lines = ",\n  ".join(json.dumps(pin) for pin in pins)
     path.write_text(f'{{"height": {PINNED_HEIGHT}, "width": {PINNED_WIDTH}, "pins": [\n  {lines}\n]}}\n')

@@ -3,7 +3,12 @@
 A folder holds meta.json and, for n images of h x w pixels, raw row-major arrays: rgb.u8 [n, h, w, 3]; sem.u8 [n, h, w]
 (0 background, 1 leaf, 2 stem, 3 main stem); dist.u8 [n, h, w], truncated inverse distance to the nearest pixel of
 another organ, times 255; depth.u16 [n, h, w], 0 for none, else 1 + 65534 (ln z - ln 0.05) / (ln 50 - ln 0.05), z in
-metres.
+metres; camera.f32 [n, 3], horizontal field of view, pitch (of the optical axis above the horizon) and roll (by how much
+up leans to the right), radians.
+
+A window of a picture is described as a camera that looks along the window's own middle: up is turned into its frame, and
+the field of view is the angle between the middles of its left and right edges. So a network that learned from windows
+speaks of any photo, cropped or not, as if its principal point were its middle.
 """
 
 import hashlib
@@ -15,7 +20,10 @@ import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFilter
 
-SIDE = 256
+# Height and width of what training sees; a batch has one of them. All have about as many pixels.
+SHAPES = [(256, 256), (256, 256), (224, 288), (192, 336), (288, 224)]
+# delta of dist, pixels: 1 % of the diagonal of a picture of 256 x 256.
+DELTA = 0.01 * np.hypot(256, 256)
 IGNORED = 255
 HELD_OUT = 0.03
 LOG_NEAR, LOG_FAR = np.log(0.05), np.log(50.0)
@@ -26,6 +34,9 @@ FILES = {
     "dist": ("dist.u8", "u1", ()),
     "depth": ("depth.u16", "<u2", ()),
 }
+CAMERAS = "camera.f32"
+# Part of a window that must show the picture for its camera to be learned from.
+MOSTLY = 0.85
 
 
 class Folder:
@@ -41,38 +52,47 @@ class Folder:
             if found != expected:
                 raise SystemExit(f"{self.path / name}: expected {expected} bytes for {shape}, found {found}")
             setattr(self, key, np.memmap(self.path / name, kind, "r", shape=shape))
+        self.cameras = np.fromfile(self.path / CAMERAS, "<f4").reshape(n, 3)
         self.learned = n - max(1, int(n * HELD_OUT))
         self.held_out = range(self.learned, n)
 
     def sha256(self):
         """Over all files, in the order of their names."""
         total = hashlib.sha256()
-        for path in sorted(self.path / name for name in ["meta.json", *(name for name, _, _ in FILES.values())]):
+        for path in sorted(self.path / name for name in ["meta.json", CAMERAS, *(name for name, _, _ in FILES.values())]):
             with path.open("rb") as file:
                 while block := file.read(1 << 22):
                     total.update(block)
         return total.hexdigest()
 
     def image(self, i):
-        """Image i as (rgb, sem, dist 0..1, log depth or 0, where depth is known), all [h, w] but rgb [h, w, 3] u8."""
+        """Image i as (rgb, sem, dist 0..1 by DELTA, log depth or 0, where depth is known), all [h, w] but rgb [h, w, 3] u8,
+        and its camera (ln tan(hfov / 2), up in the camera's frame, 1 for known) [5]."""
         known = self.depth[i] > 0
         log_depth = LOG_NEAR + (self.depth[i].astype(np.float32) - 1) / 65534 * (LOG_FAR - LOG_NEAR)
         log_depth = np.where(known, log_depth, 0).astype(np.float32)
-        return np.array(self.rgb[i]), np.array(self.sem[i]), self.dist[i].astype(np.float32) / 255, log_depth, known
+        # The label is delta / max(d, delta). Where it is 1, d is unknown: it stays 1.
+        dist = self.dist[i].astype(np.float32) / 255
+        dist = np.where(dist >= 1, 1, np.minimum(1, dist * DELTA / (0.01 * np.hypot(*dist.shape))))
+        hfov, pitch, roll = self.cameras[i].astype(np.float64)
+        up = np.cos(pitch) * np.sin(roll), -np.cos(pitch) * np.cos(roll), np.sin(pitch)
+        camera = np.array([np.log(np.tan(hfov / 2)), *up, 1])
+        return np.array(self.rgb[i]), np.array(self.sem[i]), dist, log_depth, known, camera
 
 
-def tensors(rgb, sem, dist, log_depth, known):
+def tensors(rgb, sem, dist, log_depth, known, camera):
     """One sample as the tensors that training takes: image in 0..1 [3, h, w] and its labels."""
     image = torch.from_numpy(np.ascontiguousarray(rgb.transpose(2, 0, 1), np.float32))
-    labels = (sem.astype(np.int64), dist.astype(np.float32), log_depth.astype(np.float32), known.astype(np.float32))
+    labels = (sem.astype(np.int64), *(label.astype(np.float32) for label in (dist, log_depth, known, camera)))
     return (image, *(torch.from_numpy(np.ascontiguousarray(label)) for label in labels))
 
 
 class Randomised(torch.utils.data.Dataset):
-    """Sample i is image `order[i]` changed by a generator seeded with (seed, i): the same in every run."""
+    """Sample i is an image changed by a generator seeded with (seed, i): the same in every run. `batch` samples in turn
+    have the same shape."""
 
-    def __init__(self, folders, seed, first, count):
-        self.folders, self.seed, self.first, self.count = folders, seed, first, count
+    def __init__(self, folders, seed, first, count, batch):
+        self.folders, self.seed, self.first, self.count, self.batch = folders, seed, first, count, batch
 
     def __len__(self):
         return self.count
@@ -84,44 +104,73 @@ class Randomised(torch.utils.data.Dataset):
             if at < folder.learned:
                 break
             at -= folder.learned
-        return tensors(*randomised(random, *folder.image(at)))
+        return tensors(*randomised(random, shape_of(self.seed, (self.first + i) // self.batch), *folder.image(at)))
 
 
-def randomised(random, rgb, sem, dist, log_depth, known):
+def shape_of(seed, batch):
+    """Height and width of a batch."""
+    return SHAPES[np.random.default_rng((seed, 1 << 40, batch)).integers(len(SHAPES))]
+
+
+def randomised(random, shape, rgb, sem, dist, log_depth, known, camera):
     """A crop at another scale, maybe mirrored, under another light, through a worse camera."""
-    rgb, sem, dist, log_depth, known = cropped(random, rgb, sem, dist, log_depth, known)
+    rgb, sem, dist, log_depth, known, camera = cropped(random, shape, rgb, sem, dist, log_depth, known, camera)
     if random.random() < 0.5:
         rgb, sem, dist, log_depth, known = (array[:, ::-1] for array in (rgb, sem, dist, log_depth, known))
+        camera = camera * [1, -1, 1, 1, 1]
     rgb = rgb.astype(np.float32) / 255
     organ = ((sem > 0) & (sem != IGNORED)).astype(np.float32)
-    if random.random() < 0.6:
-        rgb = other_background(random, rgb, softened(organ, random.uniform(0.3, 0.8)))
+    if random.random() < 0.4:
+        rgb, hidden = other_background(random, rgb, softened(organ, random.uniform(0.3, 0.8)))
+        if hidden:
+            known = known & (organ > 0)
     if random.random() < 0.6:
         soft = softened(organ, 0.5)
         rgb = rgb + soft * (recoloured(random, rgb, hue=0.35, saturation=0.4, gain=0.35) - rgb)
-    return camera(random, lit(random, rgb)), sem, dist, log_depth, known
+    return through_lens(random, lit(random, rgb)), sem, dist, log_depth, known, camera
 
 
-def cropped(random, rgb, sem, dist, log_depth, known):
-    """A square window brought to SIDE pixels, 0.7 to 1.5 times as large; what lies outside the picture is a mirror
-    image whose labels are ignored."""
+def cropped(random, shape, rgb, sem, dist, log_depth, known, camera):
+    """A window brought to `shape`, 0.7 to 1.5 times as large; what lies outside the picture is a mirror image whose labels
+    are ignored."""
     scale = np.exp(random.uniform(np.log(0.7), np.log(1.5)))
-    side = int(round(SIDE / scale))
+    tall, wide = (int(round(side / scale)) for side in shape)
     height, width = sem.shape
-    if side > min(height, width):
-        pad = [(max(0, side - height),) * 2, (max(0, side - width),) * 2]
+    top, left = (whole - part for whole, part in ((height, tall), (width, wide)))
+    y, x = (int(random.integers(min(0, room) // 2, max(0, room) - (-min(0, room) // 2) + 1)) for room in (top, left))
+    camera = window_camera(camera, (height, width), (y, x), (tall, wide))
+    inside = min(height, y + tall) - max(0, y), min(width, x + wide) - max(0, x)
+    camera[4] = np.prod(inside) > MOSTLY * tall * wide
+    pad = [(max(0, -at), max(0, at + part - whole)) for at, part, whole in ((y, tall, height), (x, wide, width))]
+    if max(max(edges) for edges in pad) > 0:
         rgb = np.pad(rgb, [*pad, (0, 0)], mode="reflect")
         sem = np.pad(sem, pad, constant_values=IGNORED)
         dist, log_depth, known = (np.pad(array, pad) for array in (dist, log_depth, known))
-        height, width = sem.shape
-    y, x = random.integers(height - side + 1), random.integers(width - side + 1)
-    rgb = np.asarray(Image.fromarray(rgb[y : y + side, x : x + side]).resize((SIDE, SIDE), Image.BILINEAR))
-    pick = np.clip(((np.arange(SIDE) + 0.5) * side / SIDE).astype(int), 0, side - 1)
-    sem, dist, log_depth, known = (array[np.ix_(y + pick, x + pick)] for array in (sem, dist, log_depth, known))
-    # The label is d0 / max(d, d0) with a fixed d0 in pixels (1 % of the diagonal), and distances grow with the scale.
-    # Where it is 1, d is unknown: it stays 1.
+    y, x = max(0, y), max(0, x)
+    rgb = np.asarray(Image.fromarray(rgb[y : y + tall, x : x + wide]).resize(shape[::-1], Image.BILINEAR))
+    rows, columns = (
+        at + np.clip(((np.arange(to) + 0.5) * part / to).astype(int), 0, part - 1)
+        for at, part, to in ((y, tall, shape[0]), (x, wide, shape[1]))
+    )
+    sem, dist, log_depth, known = (array[np.ix_(rows, columns)] for array in (sem, dist, log_depth, known))
+    # Distances grow with the scale.
     dist = np.where(dist >= 1, 1, np.minimum(1, dist / scale))
-    return rgb, sem, dist, log_depth, known
+    return rgb, sem, dist, log_depth, known, camera
+
+
+def window_camera(camera, whole, corner, part):
+    """The camera of a window: see above. Sizes and places are (down, right), pixels."""
+    focal = 0.5 * whole[1] / np.exp(camera[0])
+    down, right = ((at + 0.5 * size - 0.5 * full) / focal for at, size, full in zip(corner, part, whole))
+    half = 0.5 * part[1] / focal
+    edges = [np.array([right + side * half, down, 1]) for side in (-1, 1)]
+    edges = [edge / np.linalg.norm(edge) for edge in edges]
+    axis = np.array([right, down, 1]) / np.sqrt(right**2 + down**2 + 1)
+    # The least rotation that takes the axis to (0, 0, 1).
+    between = axis + [0, 0, 1]
+    up = camera[1:4]
+    up = up - between * (between @ up) / (1 + axis[2]) + 2 * np.array([0, 0, 1]) * (axis @ up)
+    return np.array([np.log(np.tan(0.5 * np.arccos(np.clip(edges[0] @ edges[1], -1, 1)))), *up, camera[4]])
 
 
 def softened(mask, radius):
@@ -129,39 +178,42 @@ def softened(mask, radius):
     return (np.asarray(image, np.float32) / 255)[..., None]
 
 
-def smooth(random, cells, channels):
-    """A random smooth field in 0..1, [SIDE, SIDE, channels], with about `cells` cells a side."""
+def smooth(random, shape, cells, channels):
+    """A random smooth field in 0..1, [*shape, channels], with about `cells` cells a side."""
     grid = (random.random((cells, cells, channels)) * 255).astype(np.uint8)
-    planes = [Image.fromarray(grid[..., c]).resize((SIDE, SIDE), Image.BICUBIC) for c in range(channels)]
+    planes = [Image.fromarray(grid[..., c]).resize(shape[::-1], Image.BICUBIC) for c in range(channels)]
     return np.stack([np.asarray(plane, np.float32) / 255 for plane in planes], axis=-1)
 
 
 def other_background(random, rgb, organ):
-    """Another ground behind the plant: recoloured at will, one plain colour, or a texture."""
-    kind = random.integers(3)
+    """Another ground behind the plant: recoloured at will, one plain colour, or a texture; and whether the old one's
+    shape is gone."""
+    kind, shape = random.integers(3), rgb.shape[:2]
     if kind == 0:
         other = recoloured(random, rgb, hue=np.pi, saturation=0.9, gain=0.6)
     elif kind == 1:
         # Walls, cloths and cabinets are light and grey more often than not.
         grey = random.uniform(0.1, 1.0) * np.ones(3)
         colour = np.clip(grey + random.normal(0, 0.12, 3), 0, 1) if random.random() < 0.6 else random.random(3)
-        other = colour * (1 + random.uniform(0, 0.4) * (smooth(random, 3, 1) - 0.5))
+        other = colour * (1 + random.uniform(0, 0.4) * (smooth(random, shape, 3, 1) - 0.5))
     else:
-        colour = smooth(random, int(random.integers(3, 48)), 3) - 0.5
-        grey = smooth(random, int(random.integers(3, 64)), 1) - 0.5
+        colour = smooth(random, shape, int(random.integers(3, 48)), 3) - 0.5
+        grey = smooth(random, shape, int(random.integers(3, 64)), 1) - 0.5
         other = random.random(3) + random.uniform(0, 0.6) * colour + random.uniform(0, 0.9) * grey
     if random.random() < 0.4:
         other = with_things(random, other)
     alpha = (1 - organ) * (random.uniform(0.5, 1) if random.random() < 0.5 else 1.0)
-    return (rgb + alpha * (other - rgb)).astype(np.float32)
+    return (rgb + alpha * (other - rgb)).astype(np.float32), kind > 0
 
 
 def with_things(random, rgb):
     """Pots, stakes, cables, stones, dark frames of photos: a few plain shapes that are no plant."""
+    height, width = rgb.shape[:2]
     image = Image.fromarray((np.clip(rgb, 0, 1) * 255).astype(np.uint8))
     draw = ImageDraw.Draw(image)
     for _ in range(random.integers(1, 6)):
-        x, y, other_x, other_y = (float(value) for value in random.uniform(-30, SIDE + 30, 4))
+        x, other_x = (float(value) for value in random.uniform(-30, width + 30, 2))
+        y, other_y = (float(value) for value in random.uniform(-30, height + 30, 2))
         grey = random.uniform(0, 255) * np.ones(3)
         colour = tuple(int(value) for value in np.clip(random.normal(grey, 25), 0, 255))
         box = [min(x, other_x), min(y, other_y), max(x, other_x), max(y, other_y)]
@@ -171,8 +223,10 @@ def with_things(random, rgb):
         elif kind == 1:
             draw.ellipse(box, fill=colour)
         elif kind == 2:
-            near, far = sorted(int(edge) for edge in random.choice([0, SIDE]) + random.integers(-12, 12, 2))
-            draw.rectangle([near, 0, far, SIDE] if random.random() < 0.7 else [0, near, SIDE, far], fill=colour)
+            upright = random.random() < 0.7
+            edge = random.choice([0, width if upright else height])
+            near, far = sorted(int(at) for at in edge + random.integers(-12, 12, 2))
+            draw.rectangle([near, 0, far, height] if upright else [0, near, width, far], fill=colour)
         else:
             draw.line([x, y, other_x, other_y], fill=colour, width=int(random.integers(1, 12)))
     return np.asarray(image, np.float32) / 255
@@ -191,7 +245,7 @@ def recoloured(random, rgb, hue, saturation, gain):
 def lit(random, rgb):
     """Exposure, contrast, gamma, white balance, uneven light, and sometimes no colour at all."""
     if random.random() < 0.3:
-        rgb = rgb * (1 + random.uniform(0.2, 1.2) * (smooth(random, int(random.integers(2, 7)), 1) - 0.5))
+        rgb = rgb * (1 + random.uniform(0.2, 1.2) * (smooth(random, rgb.shape[:2], int(random.integers(2, 7)), 1) - 0.5))
     rgb = rgb * np.exp(random.normal(0, 0.08, 3)) * np.exp(random.normal(0, 0.25))
     rgb = (rgb - 0.5) * random.uniform(0.7, 1.35) + 0.5 + random.normal(0, 0.04)
     rgb = np.clip(rgb, 0, 1) ** np.exp(random.normal(0, 0.25))
@@ -200,13 +254,13 @@ def lit(random, rgb):
     return rgb
 
 
-def camera(random, rgb):
+def through_lens(random, rgb):
     """Blur, noise and JPEG; the result is in 0..1."""
     image = Image.fromarray((np.clip(rgb, 0, 1) * 255).astype(np.uint8))
     if random.random() < 0.3:
         image = image.filter(ImageFilter.GaussianBlur(random.uniform(0.3, 1.6)))
     if random.random() < 0.5:
-        noisy = np.asarray(image, np.float32) + random.normal(0, random.uniform(1, 14), (SIDE, SIDE, 3))
+        noisy = np.asarray(image, np.float32) + random.normal(0, random.uniform(1, 14), rgb.shape)
         image = Image.fromarray(np.clip(noisy, 0, 255).astype(np.uint8))
     if random.random() < 0.4:
         data = io.BytesIO()

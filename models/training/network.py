@@ -1,7 +1,8 @@
-"""organ2d: a residual U-Net of 0.6 million parameters, made of plain convolutions.
+"""organ2d: a residual U-Net of 0.9 million parameters, made of plain convolutions, with one look at the whole picture.
 
 Plain convolutions beat depthwise ones on a CPU (spec/models.md). All work is done at half the picture's size or less:
 the last convolution gives each pixel's four quarters as channels, so that thin stems keep their full resolution.
+What needs the whole picture is pooled where it is smallest: the camera, and the plane that the ground (or a wall) is.
 """
 
 import torch
@@ -10,6 +11,9 @@ from torch.nn import functional as F
 
 WIDTHS = (24, 48, 64, 96)
 CLASSES = 4
+# Where the plane's inverse depth falls below about 1 / INVERSE_SHARP it bends to INVERSE_LEAST: beyond the horizon no
+# depth is negative. Units are whatever the network chooses, with 1 in the picture's middle at the start. Guesses.
+INVERSE_SHARP, INVERSE_LEAST = 20.0, 0.02
 
 
 def convolution(inputs, outputs, stride=1, dilation=1):
@@ -53,15 +57,50 @@ class Up(nn.Module):
         return self.block(F.relu(skip + F.interpolate(self.narrow(x), scale_factor=2.0, mode="nearest")))
 
 
+def places(x):
+    """Where the pixels of x [n, c, h, w] are: (x, y) [1, 2, h, w], 0 in the picture's middle, x = 1 at its right edge, y
+    in the same unit and downwards. What a pinhole camera sees along them is (x t, y t, 1), t = tan(hfov / 2)."""
+    height, width = x.shape[2], x.shape[3]
+    right = (2 * torch.arange(width) + 1 - width) / width
+    down = (2 * torch.arange(height) + 1 - height) / width
+    return torch.stack([right[None].expand(height, width), down[:, None].expand(height, width)])[None].float()
+
+
+class Whole(nn.Module):
+    """From means and first moments of the features over the picture: the camera [n, 6], the plane's inverse depth as a
+    linear function of `places` [n, 3], and what every pixel is told [n, width]."""
+
+    def __init__(self, width, hidden=128):
+        super().__init__()
+        self.first, self.second = nn.Linear(3 * width, hidden), nn.Linear(hidden, hidden)
+        self.camera, self.plane, self.told = nn.Linear(hidden, 6), nn.Linear(hidden, 3), nn.Linear(hidden, width)
+        for layer, bias in ((self.camera, [-0.6, 0, -0.9, -0.4, -1, -1]), (self.plane, [1, 0, 0]), (self.told, 0)):
+            nn.init.zeros_(layer.weight)
+            layer.bias.data[:] = torch.tensor(bias)
+
+    def forward(self, x):
+        at = places(x)
+        moments = [x.mean((2, 3)), (x * at[:, :1]).mean((2, 3)), (x * at[:, 1:]).mean((2, 3))]
+        x = F.relu(self.second(F.relu(self.first(torch.cat(moments, 1)))))
+        camera = self.camera(x)
+        up = camera[:, 1:4] / torch.sqrt((camera[:, 1:4] ** 2).sum(1, keepdim=True) + 1e-6)
+        return torch.cat([camera[:, :1], up, camera[:, 4:].clamp(-6, 1)], 1), self.plane(x), self.told(x)
+
+
 class Organ2d(nn.Module):
     """image [n, 3, h, w], RGB in 0..1, sides multiples of 16 -> sem logits [n, 4, h, w], dist in 0..1 [n, 1, h, w],
-    log depth up to a constant [n, 1, h, w]."""
+    log depth up to a constant [n, 1, h, w], camera [n, 6]: ln tan(hfov / 2); up as a unit vector in the camera's
+    frame (right, down, forward); ln of the standard deviations to expect of the first (a number) and of up (radians)."""
 
     def __init__(self):
         super().__init__()
         self.down = nn.ModuleList(Down(a, b) for a, b in zip((3, *WIDTHS), WIDTHS))
+        self.place = nn.Conv2d(2, WIDTHS[-1], 1)
+        nn.init.zeros_(self.place.weight)
         # Dilated, because a plant's stems are told apart by where they are on it.
         self.middle = Residual(WIDTHS[-1], dilation=2)
+        self.far = Residual(WIDTHS[-1], dilation=4)
+        self.whole = Whole(WIDTHS[-1])
         self.up = nn.ModuleList(Up(b, a) for a, b in zip(WIDTHS, WIDTHS[1:]))
         self.head = nn.Conv2d(WIDTHS[0], 4 * (CLASSES + 2), 3, padding=1)
 
@@ -69,8 +108,17 @@ class Organ2d(nn.Module):
         seen = [(image - 0.45) * 4.0]
         for down in self.down:
             seen.append(down(seen[-1]))
-        x = self.middle(seen[-1])
+        x = self.far(self.middle(seen[-1] + self.place(places(seen[-1]))))
+        # Sums over a picture want more digits than bfloat16 has.
+        with torch.autocast("cpu", enabled=False):
+            camera, plane, told = self.whole(x.float())
+        x = x + told[:, :, None, None]
         for up, skip in zip(reversed(self.up), reversed(seen[1:-1])):
             x = up(x, skip)
-        x = F.pixel_shuffle(self.head(x), 2)
-        return x[:, :CLASSES], torch.sigmoid(x[:, CLASSES : CLASSES + 1]), x[:, CLASSES + 1 :]
+        x = self.head(x)
+        # The inverse depth of a plane is linear in the picture; what stands on it is left to the head.
+        inverse = plane[:, :1, None, None] + (plane[:, 1:, None, None] * places(x)).sum(1, keepdim=True)
+        ground = -torch.log(F.softplus(INVERSE_SHARP * inverse) / INVERSE_SHARP + INVERSE_LEAST)
+        sem, dist, depth = x.split((4 * CLASSES, 4, 4), 1)
+        sem, dist, depth = (F.pixel_shuffle(part, 2) for part in (sem, dist, depth.float() + ground))
+        return sem, torch.sigmoid(dist), depth, camera

@@ -22,7 +22,8 @@ class Run:
         self.network, self.learning_rate, self.earlier_steps = network, learning_rate, 0
         if start:
             kept = torch.load(start)
-            self.network.load_state_dict(kept["average"])
+            # Parts that the earlier network had not begin as they are.
+            print(self.network.load_state_dict(kept["average"], strict=False), flush=True)
             self.earlier_steps = kept["earlier_steps"] + kept["step"]
         self.average = copy.deepcopy(self.network).eval()
         self.optimiser = torch.optim.AdamW(self.network.parameters(), learning_rate, weight_decay=1e-2)

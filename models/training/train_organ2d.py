@@ -16,8 +16,8 @@ import numpy as np
 import torch
 
 import export2d
-from images import IGNORED, LOG_FAR, LOG_NEAR, SIDE, Folder, Randomised, tensors
-from losses import Figures, depth_loss, dist_loss, semantic_loss
+from images import IGNORED, LOG_FAR, LOG_NEAR, SHAPES, Folder, Randomised, tensors
+from losses import Figures, camera_loss, depth_loss, dist_loss, semantic_loss
 from network import CLASSES, Organ2d
 from run import Run
 
@@ -51,21 +51,22 @@ class Noise(torch.utils.data.Dataset):
 
     def __getitem__(self, i):
         random = np.random.default_rng((self.seed, self.first + i))
-        shape = (SIDE, SIDE)
+        shape = SHAPES[0]
         sem = random.integers(0, CLASSES + 1, shape)
         sem[sem == CLASSES] = IGNORED
         log_depth = random.uniform(LOG_NEAR, LOG_FAR, shape)
-        return tensors(random.random((*shape, 3)), sem, random.random(shape), log_depth, random.random(shape) < 0.5)
+        known = random.random(shape) < 0.5
+        return tensors(random.random((*shape, 3)), sem, random.random(shape), log_depth, known, random.random(5))
 
 
 def losses(network, batch):
-    """The three losses, weighed equally."""
-    image, sem, dist, log_depth, known = batch
+    """The four losses, weighed equally."""
+    image, sem, dist, log_depth, known, camera = batch
     with torch.cpu.amp.autocast():
         outputs = network(image.to(memory_format=torch.channels_last))
-    logits, found_dist, found_depth = (output.float() for output in outputs)
+    logits, found_dist, found_depth, found_camera = (output.float() for output in outputs)
     depth = depth_loss(found_depth, log_depth, known, sem)
-    return [semantic_loss(logits, sem), dist_loss(found_dist, dist, sem), depth]
+    return [semantic_loss(logits, sem), dist_loss(found_dist, dist, sem), depth, camera_loss(found_camera, camera)]
 
 
 def judge(network, folders):
@@ -91,7 +92,7 @@ def main():
     endless = 1 << 40
 
     def samples(first):
-        return Noise(args.seed, first, endless) if args.smoke else Randomised(folders, args.seed, first, endless)
+        return Noise(args.seed, first, endless) if args.smoke else Randomised(folders, args.seed, first, endless, BATCH)
 
     args.work.mkdir(parents=True, exist_ok=True)
     checkpoint = args.work / "checkpoint.pt"
