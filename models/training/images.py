@@ -131,9 +131,10 @@ def randomised(random, shape, rgb, sem, dist, log_depth, known, camera):
 
 
 def cropped(random, shape, rgb, sem, dist, log_depth, known, camera):
-    """A window brought to `shape`, 0.7 to 1.5 times as large; what lies outside the picture is a mirror image whose labels
-    are ignored."""
-    scale = np.exp(random.uniform(np.log(0.7), np.log(1.5)))
+    """A window brought to `shape`, 0.7 to 1.5 times as large, no side more than 1.2 times the picture's; what lies outside
+    the picture is a mirror image whose labels are ignored."""
+    least = max(0.7, *(part / (1.2 * whole) for part, whole in zip(shape, sem.shape)))
+    scale = np.exp(random.uniform(np.log(least), np.log(max(1.5, least))))
     tall, wide = (int(round(side / scale)) for side in shape)
     height, width = sem.shape
     top, left = (whole - part for whole, part in ((height, tall), (width, wide)))
