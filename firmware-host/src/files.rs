@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 
+use demeter_capture::decode_photo;
+use demeter_frame::Rgb;
 use demeter_recon::model::{Plant, Species};
 use demeter_recon::record::{self, Record, RecordError};
 use demeter_recon::species::NAMES;
@@ -27,6 +29,14 @@ pub fn read(path: &Path) -> Result<Vec<u8>, CommandError> {
         return Err(CommandError { exit: Exit::Failed, kind: "file", message, expected: None, found: None });
     }
     Ok(bytes)
+}
+
+/// Reads a picture, JPEG or PNG.
+///
+/// # Errors
+/// [`CommandError`] `file` when it cannot be read, `bad_image` when it is no picture.
+pub fn photo(path: &Path) -> Result<Rgb, CommandError> {
+    decode_photo(&read(path)?).map_err(|error| CommandError::failed("bad_image", &error).of(path))
 }
 
 /// Writes a file whole: beside its place first, so that nobody sees half of it.

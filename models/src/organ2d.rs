@@ -6,7 +6,7 @@ use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageBuffer, Luma};
 use ndarray::{Array4, ArrayView2, Axis, s};
 
-use crate::{Layout, Model, ModelError, Port, Runtime};
+use crate::{CameraGuess, Layout, Model, ModelError, Port, Runtime};
 
 /// The network halves its input four times, so sides are multiples of this many pixels.
 const MULTIPLE: u32 = 16;
@@ -25,9 +25,19 @@ pub struct OrganMaps {
     pub log_depth: Depth,
     /// Pixels of the original image per pixel of these maps, along x and y: continuous coordinates are multiplied.
     pub scale: [f64; 2],
+    /// The camera, as the picture tells it; good for the original as for the maps.
+    pub camera: CameraGuess,
 }
 
 impl OrganMaps {
+    /// The pixel of the maps that shows pixel (x, y) of the original image.
+    #[must_use]
+    pub fn at(&self, x: u32, y: u32) -> (u32, u32) {
+        let (width, height) = self.dist.dimensions();
+        let at = |value: u32, scale: f64, side: u32| (((f64::from(value) + 0.5) / scale) as u32).min(side - 1);
+        (at(x, self.scale[0], width), at(y, self.scale[1], height))
+    }
+
     /// The likeliest class of each pixel, as the number of its [`Semantic`].
     #[must_use]
     pub fn semantic(&self) -> GrayImage {
@@ -43,8 +53,8 @@ impl OrganMaps {
 /// Our network for organs and depth: a residual U-Net trained by models/training/train_organ2d.py.
 ///
 /// The graph takes `image` f32 `[n, 3, h, w]`, RGB in 0..=1 with sides that are multiples of 16, and gives the logits
-/// `sem` `[n, 4, h, w]`, `dist` `[n, 1, h, w]` in 0..=1 and `depth` `[n, 1, h, w]`, log depth up to a constant
-/// (spec/models.md, "Our networks").
+/// `sem` `[n, 4, h, w]`, `dist` `[n, 1, h, w]` in 0..=1, `depth` `[n, 1, h, w]`, log depth up to a constant
+/// (spec/models.md, "Our networks"), and `camera` `[n, 6]`, see [`CameraGuess`].
 #[derive(Debug)]
 pub struct Organ2d {
     model: Model,
@@ -99,11 +109,13 @@ impl Organ2d {
         sem -= &sem.fold_axis(Axis(0), f32::NEG_INFINITY, |&a, &b| a.max(b));
         sem.mapv_inplace(f32::exp);
         sem /= &sem.sum_axis(Axis(0));
+        let [sx, sy] = [f64::from(width) / f64::from(w), f64::from(height) / f64::from(h)];
         Ok(OrganMaps {
             probabilities: Semantic::ALL.map(|class| raster(sem.index_axis(Axis(0), class as usize))),
             dist: raster(map("dist", 1)?.slice(s![0, 0, .., ..])),
             log_depth: raster(map("depth", 1)?.slice(s![0, 0, .., ..])),
-            scale: [f64::from(width) / f64::from(w), f64::from(height) / f64::from(h)],
+            scale: [sx, sy],
+            camera: CameraGuess::of(outputs.f32("camera", [1, CameraGuess::NUMBERS as i64])?.row(0), sx / sy),
         })
     }
 }
@@ -118,7 +130,10 @@ fn signature(ports: &[(&str, i64)]) -> Vec<Port> {
 }
 
 fn outputs() -> Vec<Port> {
-    signature(&[("sem", Semantic::ALL.len() as i64), ("dist", 1), ("depth", 1)])
+    let mut ports = signature(&[("sem", Semantic::ALL.len() as i64), ("dist", 1), ("depth", 1)]);
+    let shape = vec![-1, CameraGuess::NUMBERS as i64];
+    ports.push(Port { name: "camera".to_owned(), shape, dtype: "f32".to_owned() });
+    ports
 }
 
 /// The size nearest the image's proportions whose long side is `long_side` and whose sides are multiples of 16.

@@ -59,6 +59,18 @@ fn channels_and_pixels_stay_where_they_are() {
 }
 
 #[test]
+fn the_camera_is_of_the_original_picture() {
+    // Up is (0, 0.8, 0.6) in the network's picture, which is 64 x 48 or, of a picture of 100 x 70, taller than it was.
+    let colour = image::Rgb([0, 204, 153]);
+    let whole = run(&Graph::default(), &Rgb::from_pixel(640, 480, colour)).unwrap().camera;
+    assert!((whole.hfov - std::f64::consts::FRAC_PI_2).abs() < 1e-9, "{whole:?}");
+    assert!((whole.tilt.pitch - 0.6f64.asin()).abs() < 1e-5, "{whole:?}");
+    let rounded = run(&Graph::default(), &Rgb::from_pixel(100, 70, colour)).unwrap().camera;
+    let stretch = (48.0 / 64.0) / (70.0 / 100.0);
+    assert!((rounded.tilt.pitch - 0.6f64.atan2(0.8 / stretch)).abs() < 1e-5, "{rounded:?}");
+}
+
+#[test]
 fn two_runs_agree_to_the_last_bit() {
     let image = picture(200, 100);
     assert_eq!(run(&Graph::default(), &image).unwrap(), run(&Graph::default(), &image).unwrap());
@@ -79,6 +91,7 @@ fn outputs_that_are_not_numbers_are_errors() {
             ("sem", Graph { sem: vec![[bad, 0.0, 0.0]; 4], ..Graph::default() }),
             ("dist", Graph { dist: vec![[0.0, bad, 0.0]], ..Graph::default() }),
             ("depth", Graph { depth: vec![[0.0, 0.0, bad]], ..Graph::default() }),
+            ("camera", Graph { camera: vec![[bad, 0.0, 0.0]; 6], ..Graph::default() }),
         ] {
             let error = run(&graph, &white).unwrap_err();
             assert!(matches!(&error, ModelError::NotFinite { output: o, .. } if o == output), "{output}: {error}");

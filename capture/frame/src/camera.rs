@@ -121,12 +121,26 @@ pub struct Tilt {
     pub roll: f64,
 }
 
+impl Tilt {
+    /// How a camera is held in whose frame `up` points upwards; of unit length.
+    #[must_use]
+    pub fn of_up(up: DVec3) -> Self {
+        Self { pitch: up.z.clamp(-1.0, 1.0).asin(), roll: up.x.atan2(-up.y) }
+    }
+
+    /// Upwards in the camera's frame, of unit length: the inverse of [`Self::of_up`].
+    #[must_use]
+    pub fn up(&self) -> DVec3 {
+        let across = self.pitch.cos();
+        DVec3::new(across * self.roll.sin(), -across * self.roll.cos(), self.pitch.sin())
+    }
+}
+
 impl Pinhole {
     /// How the camera is held in a world whose z axis points up.
     #[must_use]
     pub fn tilt(&self) -> Tilt {
-        let up = self.world_from_camera.rotation.inverse() * DVec3::Z;
-        Tilt { pitch: up.z.clamp(-1.0, 1.0).asin(), roll: up.x.atan2(-up.y) }
+        Tilt::of_up(self.world_from_camera.rotation.inverse() * DVec3::Z)
     }
 }
 
@@ -147,6 +161,7 @@ mod tests {
             let camera = Pinhole { intrinsics, world_from_camera: turned };
             let tilt = camera.tilt();
             assert!((tilt.pitch - pitch).abs() < 1e-9 && (tilt.roll - roll).abs() < 1e-9, "{tilt:?}");
+            assert!((tilt.up() - turned.rotation.inverse() * DVec3::Z).length() < 1e-9);
             // Points infinitely far away at the eye's height are seen on the line that pitch and roll give.
             for azimuth in [-0.4, 0.0, 0.6] {
                 let away = turned.rotation.inverse() * DVec3::new(f64::sin(azimuth), f64::cos(azimuth), 0.0);

@@ -11,7 +11,9 @@ use crate::output::Output;
 
 mod baselines;
 mod clouds;
+mod depth;
 mod fit;
+mod green;
 mod leaf;
 mod picture;
 mod release;
@@ -30,6 +32,8 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Which {
+    /// Depth, camera and organs from single pictures.
+    Depth(depth::Args),
     /// Chamfer distance and bytes of whole plants, with labels and without, beside baselines.
     Fit(fit::Args),
     /// Chamfer distance and time of single blades, beside loose surfaces.
@@ -48,6 +52,7 @@ enum Which {
 /// [`CommandError`] when the data are missing or cannot be read.
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let table = match &args.table {
+        Which::Depth(args) => depth::table(args)?,
         Which::Fit(args) => fit::table(args)?,
         Which::Leaf(args) => leaf::table(args)?,
         Which::Segment(args) => segment::table(args)?,
