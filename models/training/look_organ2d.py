@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Paints what a checkpoint of organ2d sees in photos: photo, classes, boundaries and depth side by side, to look at.
+"""Paints what a checkpoint of organ2d sees in photos: photo, classes, boundaries and depth side by side, with the camera in words, to look at.
 
 Where plants stand before a light wall, a threshold on colour gives a mask to compare with (`--before-light`): its
 figure is a sanity check on real photos, not truth, and never training data.
@@ -10,7 +10,7 @@ import pathlib
 
 import numpy as np
 import torch
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from network import Organ2d
 
@@ -32,6 +32,21 @@ def green_or_dark(rgb):
     return (2 * share[..., 1] - share[..., 0] - share[..., 2] > 0.06) | (rgb.max(-1) < 0.55 * 255)
 
 
+def grey(depth):
+    """Log depth as brightness, near is bright; the nearest and farthest 2 % are cut."""
+    near, far = np.percentile(depth, [2, 98])
+    return (255 - 235 * ((depth - near) / max(far - near, 1e-6)).clip(0, 1)).astype(np.uint8)
+
+
+def words(camera):
+    """Field of view, pitch and roll, degrees, with what the network expects to err by."""
+    hfov = 2 * np.arctan(np.exp(camera[0]))
+    pitch, roll = np.arcsin(camera[3].clip(-1, 1)), np.arctan2(camera[1], -camera[2])
+    spread = np.exp(camera[4:])
+    hfov, pitch, roll, off = np.degrees([hfov, pitch, roll, spread[1]])
+    return f"hfov {hfov:.0f} +- {100 * spread[0]:.0f} %, pitch {pitch:.0f}, roll {roll:.0f} +- {off:.0f}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("checkpoint", type=pathlib.Path)
@@ -47,7 +62,7 @@ def main():
         rgb = np.asarray(working_image(path))
         with torch.no_grad():
             image = torch.from_numpy(rgb.transpose(2, 0, 1).astype(np.float32) / 255)[None]
-            logits, dist, depth = (output[0].numpy() for output in network(image))
+            logits, dist, depth, camera = (output[0].numpy() for output in network(image))
         best = logits.argmax(0)
         if args.before_light:
             # Without the pot below and the dark frame that some photos have at their sides.
@@ -55,12 +70,11 @@ def main():
             plant, mask = best[above] > 0, green_or_dark(rgb.astype(np.float32))[above]
             overlaps.append((plant & mask).sum() / max(1, (plant | mask).sum()))
         if args.out:
-            plant = best > 0
-            near, far = (depth[0][plant].min(), depth[0][plant].max()) if plant.any() else (0, 1)
-            relative = np.where(plant, 255 - 200 * (depth[0] - near) / max(far - near, 1e-6), 0)
-            grey = np.stack([dist[0] * 255 * plant, relative])[..., None].clip(0, 255).astype(np.uint8).repeat(3, -1)
-            row = Image.fromarray(np.concatenate([rgb, COLOURS[best], *grey], axis=1))
-            rows.append(row.resize((1200, max(1, row.height * 1200 // row.width))))
+            maps = np.stack([(dist[0] * 255 * (best > 0)).astype(np.uint8), grey(depth[0])])[..., None].repeat(3, -1)
+            row = Image.fromarray(np.concatenate([rgb, COLOURS[best], *maps], axis=1))
+            row = row.resize((1200, max(1, row.height * 1200 // row.width)))
+            ImageDraw.Draw(row).text((4, 2), f"{path.name[:24]}: {words(camera)}", fill=(255, 255, 0), stroke_width=1, stroke_fill=(0, 0, 0))
+            rows.append(row)
     if overlaps:
         figures = f"mean {np.mean(overlaps):.3f}, median {np.median(overlaps):.3f}, worst {min(overlaps):.3f}"
         print(f"IoU with the colour threshold: {figures}, {len(overlaps)} photos")
