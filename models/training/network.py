@@ -13,7 +13,7 @@ WIDTHS = (24, 48, 64, 96)
 CLASSES = 4
 # Where the plane's inverse depth falls below about 1 / INVERSE_SHARP it bends to INVERSE_LEAST: beyond the horizon no
 # depth is negative. Units are whatever the network chooses, with 1 in the picture's middle at the start. Guesses.
-INVERSE_SHARP, INVERSE_LEAST = 20.0, 0.02
+INVERSE_SHARP, INVERSE_LEAST = 60.0, 0.005
 
 
 def convolution(inputs, outputs, stride=1, dilation=1):
