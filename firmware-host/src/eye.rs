@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use demeter_frame::{Intrinsics, Pose, Rgb};
-use demeter_models::{ModelError, RuntimeError};
+use demeter_models::{CameraGuess, ModelError, RuntimeError};
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::view::{self, DepthScale, Dropped, PlantView, Refused, ScaleError, View, ViewError};
 use glam::DVec2;
@@ -127,6 +127,14 @@ impl Eye {
     #[must_use]
     pub fn degraded(&self) -> &[Degraded] {
         &self.networks.degraded
+    }
+
+    /// The camera, as far as a picture tells it.
+    ///
+    /// # Errors
+    /// [`SightError::Network`] when the network fails.
+    pub fn camera(&mut self, picture: &Rgb) -> Result<CameraGuess, SightError> {
+        self.networks.camera(picture)
     }
 
     /// Looks at a picture. With a place in the world the ground gives metres; without one the plants are put at 1 m.

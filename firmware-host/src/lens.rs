@@ -1,21 +1,23 @@
-//! The camera of a photo: a calibration file, else what the photo says of its lens, else a guess that is told.
+//! The camera of a photo: a calibration file, else what the photo says of its lens, else what the network sees in it;
+//! what is not known is told.
 
 use std::path::Path;
 
 use demeter_frame::{Intrinsics, Rgb};
+use demeter_models::CameraGuess;
 use exif::{In, Tag};
 use image::imageops::{rotate90, rotate180, rotate270};
 
 use crate::error::CommandError;
 use crate::files;
 
-/// Horizontal field of view when nothing is known, degrees: between phones (about 65 upright to 70) and the lenses of
-/// imaging chambers (about 35). A guess; what depends on it is told in a warning.
-const DEFAULT_HFOV_DEGREES: f64 = 50.0;
 /// The diagonal of the film that "35 mm equivalent" refers to, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615;
 /// Fields of view that a pinhole can have, degrees.
 const HFOV_DEGREES: std::ops::RangeInclusive<f64> = 1.0..=170.0;
+
+/// Fields of view, degrees, that a guess is held to: from a long lens to an action camera (a guess itself).
+const GUESSED_DEGREES: (f64, f64) = (10.0, 120.0);
 
 /// A photo's camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +40,7 @@ pub fn upright(photo: Rgb, bytes: &[u8]) -> (Rgb, bool) {
     }
 }
 
-/// The camera of an upright photo.
+/// The camera of an upright photo, `None` when nobody tells it.
 ///
 /// # Errors
 /// [`CommandError`] (bad use) for a calibration or field of view that no camera has.
@@ -48,7 +50,7 @@ pub fn of(
     turned: bool,
     calibration: Option<&Path>,
     hfov_degrees: Option<f64>,
-) -> Result<Lens, CommandError> {
+) -> Result<Option<Lens>, CommandError> {
     let (width, height) = photo.dimensions();
     if let Some(path) = calibration {
         let camera = calibrated(path)?;
@@ -60,31 +62,36 @@ pub fn of(
             return Err(CommandError::usage("calibration", message)
                 .with(format!("{width}x{height}"), format!("{}x{}", camera.width, camera.height)));
         }
-        return Ok(Lens { camera, warning: None });
+        return Ok(Some(Lens { camera, warning: None }));
     }
     if let Some(degrees) = hfov_degrees {
         if !HFOV_DEGREES.contains(&degrees) {
             return Err(CommandError::usage("hfov", "--hfov: no camera has that field of view")
                 .with("1 to 170 degrees", degrees));
         }
-        return Ok(Lens { camera: Intrinsics::from_hfov(width, height, degrees.to_radians()), warning: None });
+        let camera = Intrinsics::from_hfov(width, height, degrees.to_radians());
+        return Ok(Some(Lens { camera, warning: None }));
     }
     let diagonal = f64::from(width).hypot(f64::from(height));
     let f = number(bytes, Tag::FocalLengthIn35mmFilm).filter(|mm| *mm > 1.0).map(|mm| mm / FILM_DIAGONAL_MM * diagonal);
-    Ok(match f {
-        Some(f) => {
-            let hfov = 2.0 * (f64::from(width) / 2.0 / f).atan();
-            let warning = format!("focal length from the photo's EXIF: field of view {:.0} degrees", hfov.to_degrees());
-            Lens { camera: Intrinsics::from_hfov(width, height, hfov), warning: Some(warning) }
-        }
-        None => Lens {
-            camera: Intrinsics::from_hfov(width, height, DEFAULT_HFOV_DEGREES.to_radians()),
-            warning: Some(format!(
-                "the photo does not tell its lens: {DEFAULT_HFOV_DEGREES} degrees of horizontal field of view assumed \
-                 (--hfov or --calibration)"
-            )),
-        },
-    })
+    Ok(f.map(|f| {
+        let hfov = 2.0 * (f64::from(width) / 2.0 / f).atan();
+        let warning = format!("focal length from the photo's EXIF: field of view {:.0} degrees", hfov.to_degrees());
+        Lens { camera: Intrinsics::from_hfov(width, height, hfov), warning: Some(warning) }
+    }))
+}
+
+/// The camera as the network sees it in the photo.
+#[must_use]
+pub fn guessed(photo: &Rgb, guess: &CameraGuess) -> Lens {
+    let (width, height) = photo.dimensions();
+    let degrees = guess.hfov.to_degrees().clamp(GUESSED_DEGREES.0, GUESSED_DEGREES.1);
+    let warning = format!(
+        "the photo does not tell its lens: {degrees:.0} degrees of horizontal field of view, give or take {:.0} %, guessed \
+         from what it shows (--hfov or --calibration)",
+        100.0 * guess.hfov_spread
+    );
+    Lens { camera: Intrinsics::from_hfov(width, height, degrees.to_radians()), warning: Some(warning) }
 }
 
 fn calibrated(path: &Path) -> Result<Intrinsics, CommandError> {

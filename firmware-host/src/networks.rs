@@ -6,7 +6,8 @@ use std::num::NonZeroUsize;
 
 use demeter_frame::{Depth, Instances, Intrinsics, Mask, Rgb, Semantic};
 use demeter_models::{
-    DepthMap, DepthNetwork, Instance, Model, ModelError, Organ2d, OrganMaps, OrganNetwork, Runtime, find_manifest,
+    CameraGuess, DepthMap, DepthNetwork, Instance, Model, ModelError, Organ2d, OrganMaps, OrganNetwork, Runtime,
+    find_manifest,
 };
 use demeter_recon::view::{self, Region, View, ViewError};
 use demeter_recon::world::boundary_distance;
@@ -95,6 +96,11 @@ impl Networks {
             .chain(organs)
             .chain(self.depth.iter().map(DepthNetwork::model))
             .collect()
+    }
+
+    /// The camera as ours sees it.
+    pub(crate) fn camera(&mut self, picture: &Rgb) -> Result<CameraGuess, SightError> {
+        Ok(self.ours.run(picture)?.camera)
     }
 
     /// Looks at a picture. Ours must give an answer; what of the others fails is left out and said.

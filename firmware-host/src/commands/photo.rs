@@ -13,7 +13,7 @@ use glam::DVec3;
 use crate::config::Config;
 use crate::describe::{Described, Encoding, describe};
 use crate::error::{CommandError, Exit, chain};
-use crate::eye::{Eye, PlantSight};
+use crate::eye::{Eye, PlantSight, SightError};
 use crate::files;
 use crate::lens::{self, Lens};
 use crate::output::Output;
@@ -71,12 +71,17 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let bytes = files::read(&args.image)?;
     let photo = decode_photo(&bytes).map_err(|error| CommandError::failed("bad_image", &error))?;
     let (photo, turned) = lens::upright(photo, &bytes);
-    let Lens { camera, warning } = lens::of(&photo, &bytes, turned, args.calibration.as_deref(), args.hfov)?;
-    let mut warnings: Vec<String> = warning.into_iter().collect();
+    let told = lens::of(&photo, &bytes, turned, args.calibration.as_deref(), args.hfov)?;
 
     let config = Config::load(args.config.as_deref())?;
     let mut eye = Eye::open(&config.models, NonZeroUsize::MIN).and_then(Eye::closer)?;
-    let sight = eye.look(&photo, &camera, None).map_err(|error| CommandError::failed(error.name(), &error))?;
+    let blind = |error: SightError| CommandError::failed(error.name(), &error);
+    let Lens { camera, warning } = match told {
+        Some(lens) => lens,
+        None => lens::guessed(&photo, &eye.camera(&photo).map_err(blind)?),
+    };
+    let mut warnings: Vec<String> = warning.into_iter().collect();
+    let sight = eye.look(&photo, &camera, None).map_err(blind)?;
     warnings.extend(eye.degraded().iter().chain(&sight.degraded).map(ToString::to_string));
     let (scale_source, mut seen) = (sight.scale_source, sight.plants);
     if seen.is_empty() {
