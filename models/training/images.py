@@ -249,7 +249,7 @@ def lit(random, rgb):
         rgb = rgb * (1 + random.uniform(0.2, 1.2) * (smooth(random, rgb.shape[:2], int(random.integers(2, 7)), 1) - 0.5))
     rgb = rgb * np.exp(random.normal(0, 0.08, 3)) * np.exp(random.normal(0, 0.25))
     rgb = (rgb - 0.5) * random.uniform(0.7, 1.35) + 0.5 + random.normal(0, 0.04)
-    rgb = np.clip(rgb, 0, 1) ** np.exp(random.normal(0, 0.25))
+    rgb = np.clip(rgb.astype(np.float32), 0, 1) ** np.float32(np.exp(random.normal(0, 0.25)))
     if random.random() < 0.05:
         rgb = np.repeat(rgb.mean(axis=-1, keepdims=True), 3, axis=-1)
     return rgb
