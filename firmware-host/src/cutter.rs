@@ -112,3 +112,62 @@ fn cut(
     }
     Ok(plants)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use demeter_frame::{Depth, Mask};
+    use demeter_models::Candidate;
+    use demeter_recon::model::OrganKind;
+
+    use super::*;
+
+    /// SAM 2's small graphs, whose cutouts are all that is to the left of the point.
+    fn sam() -> (SamEncoder, SamDecoder) {
+        let (runtime, folder) = (Runtime::load(None).unwrap(), tempfile::tempdir().unwrap());
+        let install = |name: &str| {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../models/tests/fixtures/{name}.onnx"));
+            Candidate::examine(&runtime, &file, None).unwrap().install(folder.path(), false).unwrap()
+        };
+        let (encoder, decoder) = (install("sam2_encoder"), install("sam2_decoder"));
+        let one = NonZeroUsize::MIN;
+        (SamEncoder::open(&runtime, &encoder, one).unwrap(), SamDecoder::open(&runtime, &decoder, one).unwrap())
+    }
+
+    /// One leaf over some columns, its surest pixel in the last of them.
+    fn leaf(columns: std::ops::Range<u32>) -> (OrganMaps, Instances, Region) {
+        let (width, height) = (16, 8);
+        let is = |x: u32| columns.contains(&x);
+        let plant = Mask::from_fn(width, height, |x, _| Luma([if is(x) { 1.0 } else { 0.0 }]));
+        let ground = Mask::from_fn(width, height, |x, _| Luma([if is(x) { 0.0 } else { 1.0 }]));
+        let none = Mask::new(width, height);
+        let dist = Mask::from_fn(width, height, |x, _| Luma([if x + 1 == columns.end { 0.1 } else { 0.9 }]));
+        let maps = OrganMaps {
+            probabilities: [ground, plant, none.clone(), none],
+            dist,
+            log_depth: Depth::new(width, height),
+            scale: [4.0; 2],
+        };
+        let raster = Instances::from_fn(width, height, |x, _| Luma([u16::from(is(x))]));
+        let bounds = [columns.start, 0, columns.end - 1, height - 1];
+        let region = Region { id: 1, kind: OrganKind::Leaf, pixels: 8, touches_border: true, bounds };
+        (maps, raster, region)
+    }
+
+    #[test]
+    fn sam_is_asked_at_our_surest_pixel_and_ground_is_left_out() {
+        let mut cutter = Cutter::Sam(Box::new(sam()));
+        let picture = Rgb::from_pixel(64, 32, image::Rgb([20, 200, 20]));
+        let mut cut = |columns| {
+            let (maps, raster, region) = leaf(columns);
+            cutter.run(&picture, &maps, (&raster, &[region])).unwrap()
+        };
+        // The point is in the middle of column 9 of 16, pixel 38 of 64: what is left of it.
+        let mask = cut(0..10);
+        assert!(mask.enumerate_pixels().all(|(x, _, pixel)| (pixel.0[0] > 0) == (x < 10) || x == 9));
+        assert!(mask.get_pixel(8, 4).0[0] > 0);
+        // A leaf of one column: the cutout is nearly all ground.
+        assert!(cut(12..13).iter().all(|&pixel| pixel == 0));
+    }
+}
