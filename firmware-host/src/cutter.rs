@@ -117,9 +117,10 @@ fn cut(
 mod tests {
     use std::path::Path;
 
-    use demeter_frame::{Depth, Mask};
-    use demeter_models::Candidate;
+    use demeter_frame::{Depth, Mask, Tilt};
+    use demeter_models::{CameraGuess, Candidate};
     use demeter_recon::model::OrganKind;
+    use glam::DVec3;
 
     use super::*;
 
@@ -148,6 +149,7 @@ mod tests {
             dist,
             log_depth: Depth::new(width, height),
             scale: [4.0; 2],
+            camera: CameraGuess { hfov: 1.0, tilt: Tilt::of_up(DVec3::NEG_Y), hfov_spread: 0.1, tilt_spread: 0.1 },
         };
         let raster = Instances::from_fn(width, height, |x, _| Luma([u16::from(is(x))]));
         let bounds = [columns.start, 0, columns.end - 1, height - 1];
