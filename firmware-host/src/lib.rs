@@ -9,6 +9,7 @@ pub mod commands;
 pub mod config;
 mod cutter;
 pub mod describe;
+pub mod divider;
 pub mod error;
 pub mod eye;
 pub mod files;

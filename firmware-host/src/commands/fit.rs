@@ -8,12 +8,13 @@ use demeter_recon::cloud::{PointCloud, PointOrgan};
 use demeter_recon::export::cloud_to_ply;
 use demeter_recon::model::OrganKind;
 use demeter_recon::organs::{OrganTree, ScaleSource};
-use demeter_recon::segment::{Labels, Up, segment};
+use demeter_recon::segment::{Labels, Up};
 use demeter_recon::{fit, tree};
 use glam::DVec3;
 
 use super::target::Target;
 use crate::describe::describe;
+use crate::divider::{Divided, Divider, OrganSource};
 use crate::error::{CommandError, Exit};
 use crate::files;
 use crate::output::Output;
@@ -29,9 +30,12 @@ pub struct Args {
     species: String,
     /// Where organs come from. auto: the cloud's properties `organ` and `kind` (0 main stem, 1 stem or petiole, 2
     /// leaf; negative organs are left out), as --points writes them; else its `label` (0 all stems, 1.. one a leaf),
-    /// else geometry. label: its `label`, which it must have. none: geometry.
+    /// else what --organs says. label: its `label`, which it must have. none: what --organs says.
     #[arg(long, value_enum, default_value_t)]
     labels: LabelSource,
+    /// What finds organs without labels. Where the network does not open, geometry stands in and a warning says so.
+    #[arg(long, value_enum, default_value_t)]
+    organs: OrganSource,
     /// Unit of the cloud's coordinates.
     #[arg(long, value_enum, default_value_t)]
     unit: Unit,
@@ -95,7 +99,10 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         LabelSource::Label => Labels::Own,
         LabelSource::None => Labels::None,
     };
-    let segmented = segment(&cloud, &species, labels, up).map_err(|error| args.refused("segmentation", &error))?;
+    let Divided { segmented, network, degraded } = Divider::new(args.organs)
+        .divide(&cloud, &species, labels, up)
+        .map_err(|error| args.refused("segmentation", &error))?;
+    let warnings = network.map(|name| format!("organs were found by {name}")).into_iter().chain(degraded).collect();
     let tree = tree::build(segmented.organs).map_err(|error| args.refused("topology", &error))?;
     let fitted = fit::plant(&tree, &species, segmented.up).map_err(|error| args.refused("fit", &error))?;
     let mut described = describe(&fitted, &species, &cloud.points, ScaleSource::Input, args.target.encoding())?;
@@ -106,7 +113,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     }
     described.report.ms = Some(started.elapsed().as_secs_f64() * 1e3);
     let plants = vec![described.report];
-    output.plants(&Document { plants, warnings: Vec::new(), seconds: Some(started.elapsed().as_secs_f64()) })?;
+    output.plants(&Document { plants, warnings, seconds: Some(started.elapsed().as_secs_f64()) })?;
     Ok(Exit::Done)
 }
 

@@ -17,12 +17,15 @@ const NECK: f64 = 0.7;
 const RAGGED: f64 = 0.4;
 
 /// Divides the points of sheets; returns blades, and which points are at an edge. `near` lists each point's neighbours
-/// in its own sheet, `None` for points of no sheet; `normals` are unit, `grain` is metres.
+/// in its own sheet, `None` for points of no sheet; `normals` are unit, `grain` is metres. Where the distance of each point
+/// to the nearest of `others`, organs that are not its own, is known, metres too, depth is the geometric mean of both: what
+/// parts blades is a neck that has others beside it.
 pub(super) fn apart(
     points: &[DVec3],
     normals: &[DVec3],
     near: &[Option<Vec<usize>>],
     grain: f64,
+    others: Option<&[f64]>,
 ) -> (Vec<Vec<usize>>, Vec<bool>) {
     let inside: Vec<usize> = (0..points.len()).filter(|i| near[*i].is_some()).collect();
     let around = |i: usize| near[i].iter().flatten().copied();
@@ -36,9 +39,11 @@ pub(super) fn apart(
     let raw = shortest(points.len(), &edge, |i| around(i).map(move |j| (j, metres(i, j))));
     // A closed sheet has no edge.
     let raw = |i: usize| if raw[i].is_finite() { raw[i] } else { grain };
-    let depth: Vec<f64> = (0..points.len())
-        .map(|i| (raw(i) + around(i).map(raw).sum::<f64>()) / (1.0 + around(i).count() as f64))
-        .collect();
+    let smooth = |i: usize, of: &dyn Fn(usize) -> f64| {
+        (of(i) + around(i).map(of).sum::<f64>()) / (1.0 + around(i).count() as f64)
+    };
+    let other = |i: usize| others.map_or_else(|| raw(i), |others| others[i]);
+    let depth: Vec<f64> = (0..points.len()).map(|i| (smooth(i, &raw) * smooth(i, &other)).sqrt()).collect();
     let mut order = inside;
     order.sort_by(|a, b| depth[*b].total_cmp(&depth[*a]));
     let mut basins = Basins { of: vec![usize::MAX; points.len()], parent: Vec::new(), peak: Vec::new() };

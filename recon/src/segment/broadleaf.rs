@@ -1,8 +1,9 @@
-//! Broad-leaved plants without labels: flat neighbourhoods are leaves, elongated ones stems; leaves grow along
-//! agreeing normals, stems are taken apart along their skeleton.
+//! Broad-leaved plants without labels: flat neighbourhoods are leaves, elongated ones stems, unless a network says which
+//! are which; leaves grow along agreeing normals, stems are taken apart along their skeleton.
 
 use glam::DVec3;
 
+use super::unlabelled::Evidence;
 use super::{MIN_ORGAN_POINTS, blades, grain, nearest_to, organ, parting, stems};
 use crate::axes::PrincipalAxes;
 use crate::graph::pieces;
@@ -29,10 +30,22 @@ const FEW: usize = 15;
 const SHEET_REACH: f64 = 1.6;
 /// Largest piece of a stem that may pass for a sheet, as a share of the largest blade's points (a guess).
 const PATCH_SHARE: f64 = 0.2;
+/// Share of the cloud's points that is the least blade, of geometry's and of a network's (guesses: a network's classes
+/// are flecked).
+const LEAST: f64 = 1.0 / 400.0;
+const LEAST_PREDICTED: f64 = 1.0 / 200.0;
+/// Weight of a network's classes beside geometry's: what it is sure of stands, where it doubts geometry decides.
+const TRUST: f64 = 2.0 / 3.0;
 /// Neighbours whose votes smooth the classes.
-const VOTERS: usize = 15;
+pub(super) const VOTERS: usize = 15;
 
-pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3, species: &Species) -> Vec<OrganCloud> {
+pub(super) fn segment(
+    points: &[DVec3],
+    foot: DVec3,
+    up: DVec3,
+    species: &Species,
+    evidence: Option<&Evidence>,
+) -> Vec<OrganCloud> {
     let search = Nearest::of(points);
     let grain = grain(points, &search, 10);
     let radius = (SCALE_SHARE * crate::cloud::diagonal(points).unwrap_or(0.0)).max(2.0 * grain);
@@ -44,13 +57,23 @@ pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3, species: &Specie
     for _ in 0..2 {
         is_stem = near.iter().map(|n| 2 * n.iter().filter(|j| is_stem[**j]).count() > n.len()).collect();
     }
+    if let Some(evidence) = evidence {
+        let share = |near: &[usize]| near.iter().filter(|j| !is_stem[**j]).count() as f64 / near.len() as f64;
+        let leaf = |near: &[usize]| TRUST * evidence.leaf_among(near) + (1.0 - TRUST) * share(near);
+        is_stem = near.iter().map(|near| leaf(near) < 0.5).collect();
+    }
     let base = nearest_to(points, foot);
     // The foot is a stem whatever it looks like.
     for n in search.within(points[base], radius) {
         is_stem[n.index] = true;
     }
-    let least = MIN_ORGAN_POINTS.max(points.len() / 400);
-    let balls = balls(points, &near, &shapes, &is_stem, SHEET_REACH * grain);
+    let least = evidence.map_or(LEAST, |_| LEAST_PREDICTED) * points.len() as f64;
+    let least = MIN_ORGAN_POINTS.max(least as usize);
+    let balls = match evidence {
+        // A network knows leaves that are no sheets, and stems that are.
+        Some(_) => Vec::new(),
+        None => balls(points, &near, &shapes, &is_stem, SHEET_REACH * grain),
+    };
     let balls: Vec<Vec<usize>> = balls.into_iter().filter(|ball| ball.len() >= least).collect();
     let mut in_ball = vec![false; points.len()];
     for i in balls.iter().flatten() {
@@ -67,13 +90,15 @@ pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3, species: &Specie
     };
     let sheets: Vec<Option<Vec<usize>>> = (0..points.len()).map(joined).collect();
     let normals: Vec<DVec3> = shapes.iter().map(|shape| shape.normal).collect();
-    let (blades, edge) = blades::apart(points, &normals, &sheets, grain);
+    let (blades, edge) = blades::apart(points, &normals, &sheets, grain, evidence.map(|e| e.distance.as_slice()));
     // A piece of a thick stem's surface is a sheet too, but a small one, and its edge is not free.
     let largest = blades.iter().map(Vec::len).max().unwrap_or(0) as f64;
     let by_stem = |i: &usize| near[*i].iter().any(|j| is_stem[*j]);
     let is_blade = |blade: &Vec<usize>| {
         let free = blade.iter().filter(|i| edge[**i] && !by_stem(i)).count();
-        blade.len() as f64 > PATCH_SHARE * largest || free >= blade.iter().filter(|i| by_stem(i)).count()
+        evidence.is_some()
+            || blade.len() as f64 > PATCH_SHARE * largest
+            || free >= blade.iter().filter(|i| by_stem(i)).count()
     };
     let (blades, patches): (Vec<_>, Vec<_>) = blades.into_iter().partition(is_blade);
     patches.concat().into_iter().for_each(|i| is_stem[i] = true);
@@ -82,7 +107,7 @@ pub(super) fn segment(points: &[DVec3], foot: DVec3, up: DVec3, species: &Specie
     let stems: Vec<usize> = (0..points.len()).filter(|i| is_stem[*i]).collect();
     let (blades, stems) = adopt(points, blades, stems, crumbs.concat());
     let blades = parting::part(points, blades, up, species);
-    let mut organs = stems::split(points, &stems, &blades, foot, species.habit);
+    let mut organs = stems::split(points, &stems, &blades, foot, species.habit, evidence.map(|e| e.main.as_slice()));
     organs.extend(blades.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
     organs
 }

@@ -20,12 +20,17 @@ pub(super) fn segment(points: &[DVec3], labels: &[i32], habit: Habit, up: Up) ->
     let (up, foot) = up.resolve(points, known.then_some(is_stem.as_slice()));
     if !known {
         // Leaves hide the stem, or their sheaths are labelled as they are: it is what a whole plant's skeleton says.
-        trunk = grass::segment(points, foot.point, up).swap_remove(0).source.into_iter().map(|i| i as usize).collect();
+        trunk = grass::segment(points, foot.point, up, None)
+            .swap_remove(0)
+            .source
+            .into_iter()
+            .map(|i| i as usize)
+            .collect();
         trunk.iter().for_each(|i| is_stem[*i] = true);
         members.values_mut().for_each(|leaf| leaf.retain(|i| !is_stem[*i]));
     }
     let leaves: Vec<Vec<usize>> = members.into_values().filter(|m| m.len() >= MIN_ORGAN_POINTS).collect();
-    let mut organs = stems::split(points, &trunk, &leaves, foot.point, habit);
+    let mut organs = stems::split(points, &trunk, &leaves, foot.point, habit, None);
     organs.extend(leaves.into_iter().map(|m| organ(points, OrganKind::Leaf, m)));
     organs.retain(is_fittable);
     Segmented { organs, up }

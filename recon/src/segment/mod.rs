@@ -1,4 +1,5 @@
-//! Clouds to organs (spec/reconstruction.md "Points to organs"): by labels where there are any, else by geometry.
+//! Clouds to organs (spec/reconstruction.md "Points to organs"): by labels where there are any, else by geometry and by
+//! what a network says of the points.
 
 mod apart;
 mod beside;
@@ -10,13 +11,15 @@ mod labelled;
 mod lattice;
 mod parting;
 mod stems;
+mod unlabelled;
 mod up;
 
+use demeter_frame::PointMaps;
 use glam::DVec3;
 
 use crate::cloud::{PointCloud, PointOrgan, diagonal};
 use crate::fit;
-use crate::model::{Habit, OrganKind, Species};
+use crate::model::{OrganKind, Species};
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
 use crate::statistics::median;
@@ -56,6 +59,14 @@ pub enum SegmentError {
     Labels {
         /// What is there.
         found: &'static str,
+    },
+    /// What a network says is of another cloud.
+    #[error("network: expected an answer for each of {expected} points, found {found}")]
+    Maps {
+        /// Points.
+        expected: usize,
+        /// Answers.
+        found: usize,
     },
     /// Organs are apart, and the points of one disagree about what it is.
     #[error("organ {organ}: expected one `kind` for all its points, found several")]
@@ -97,28 +108,45 @@ impl Segmented {
 /// [`SegmentError`] when the cloud is too small, not finite, or lacks labels that were asked for,
 /// or when a given organ is of several kinds.
 pub fn segment(cloud: &PointCloud, species: &Species, labels: Labels, up: Up) -> Result<Segmented, SegmentError> {
-    let found = cloud.points.len();
-    if found < MIN_POINTS {
-        return Err(SegmentError::Points { expected: MIN_POINTS, found });
-    }
-    let found_metres =
-        if cloud.points.iter().all(|p| p.is_finite()) { diagonal(&cloud.points).unwrap_or(0.0) } else { f64::NAN };
-    if !(found_metres.is_finite() && found_metres > 1e-3) {
-        return Err(SegmentError::Extent { found_metres });
-    }
+    check(&cloud.points)?;
     match (labels, &cloud.organs, &cloud.labels) {
         (Labels::Auto, Some(organs), _) => apart::segment(&cloud.points, organs, up),
         (Labels::Auto | Labels::Own, _, Some(own)) => Ok(labelled::segment(&cloud.points, own, species.habit, up)),
         (Labels::Own, _, None) => Err(SegmentError::Labels { found: "none" }),
-        (Labels::None, _, _) | (Labels::Auto, None, None) => {
-            let (up, foot) = up.resolve(&cloud.points, None);
-            let organs = match species.habit {
-                Habit::Grass => grass::segment(&cloud.points, foot.point, up),
-                Habit::Simple | Habit::Compound => broadleaf::segment(&cloud.points, foot.point, up, species),
-            };
-            Ok(Segmented { organs: organs.into_iter().filter(is_fittable).collect(), up })
-        }
+        (Labels::None, _, _) | (Labels::Auto, None, None) => Ok(unlabelled::segment(&cloud.points, None, species, up)),
     }
+}
+
+/// Divides a cloud into organs by geometry and by what a network says of its points.
+///
+/// # Errors
+/// [`SegmentError`] when the cloud is too small or not finite, or `maps` is of another number of points.
+pub fn segment_predicted(
+    points: &[DVec3],
+    maps: &PointMaps,
+    species: &Species,
+    up: Up,
+) -> Result<Segmented, SegmentError> {
+    check(points)?;
+    let expected = points.len();
+    if let Some(found) = [maps.probabilities.len(), maps.boundary.len()].into_iter().find(|n| *n != expected) {
+        return Err(SegmentError::Maps { expected, found });
+    }
+    Ok(unlabelled::segment(points, Some(maps), species, up))
+}
+
+/// Refuses clouds that are no plant's.
+fn check(points: &[DVec3]) -> Result<(), SegmentError> {
+    let found = points.len();
+    if found < MIN_POINTS {
+        return Err(SegmentError::Points { expected: MIN_POINTS, found });
+    }
+    let finite = points.iter().all(|p| p.is_finite());
+    let found_metres = if finite { diagonal(points).unwrap_or(0.0) } else { f64::NAN };
+    if !(found_metres.is_finite() && found_metres > 1e-3) {
+        return Err(SegmentError::Extent { found_metres });
+    }
+    Ok(())
 }
 
 /// Geometry leaves scraps: a branch of a point or two, or of points that coincide. The main stem stays, whatever it is.

@@ -21,7 +21,7 @@ const SAMPLES: usize = 300;
 const DOUBT: f64 = 1.25;
 /// Largest share of its miss that parts of a blade may leave (a guess: each part has its own ten shapes and bends, and
 /// halves of one blade gain little by them).
-const LEFT: f64 = 0.65;
+const LEFT: f64 = 0.4;
 /// Most parts tried at once: leaflets of one leaf meet in one place.
 const PARTS: usize = 3;
 

@@ -9,6 +9,7 @@ use crate::graph::{CloudGraph, Skeleton};
 use crate::model::{Habit, OrganKind};
 use crate::nearest::Nearest;
 use crate::organs::OrganCloud;
+use crate::statistics::mean;
 use crate::tree::middle_cost;
 
 /// Points of all stems together that the skeleton is drawn from: more than a scan's stems have, few enough to be quick.
@@ -26,16 +27,20 @@ const AHEAD: usize = 6;
 /// Cosine of the largest turn of a stem that goes on beyond its last fork (20°): petioles leave more sharply.
 const STRAIGHT: f64 = 0.94;
 
-/// Divides the stem points `members`; `blades` say what hangs on them. The main stem comes first.
+/// Divides the stem points `members`; `blades` say what hangs on them. The main stem comes first: where `main` has for
+/// each of the points a chance that it is the main stem's and no other stem's, the way that agrees best with those, else
+/// the one that carries most.
 pub(super) fn split(
     points: &[DVec3],
     members: &[usize],
     blades: &[Vec<usize>],
     foot: DVec3,
     habit: Habit,
+    main: Option<&[f64]>,
 ) -> Vec<OrganCloud> {
     let all: Vec<DVec3> = members.iter().map(|i| points[*i]).collect();
-    let own: Vec<DVec3> = one_a_cell(&all, SEEN).into_iter().map(|i| all[i]).collect();
+    let seen = one_a_cell(&all, SEEN);
+    let own: Vec<DVec3> = seen.iter().map(|i| all[*i]).collect();
     let search = Nearest::of(&own);
     // The third neighbour, because stems of sparse scans are single rows of points.
     let grain = grain(&own, &search, 3);
@@ -54,7 +59,11 @@ pub(super) fn split(
             Some((node_of[at], size))
         })
         .collect();
-    let division = Division::of(&own, skeleton, &hangs, LEAST * grain, habit);
+    let main = main.map(|chance| {
+        let of_set = |set: &Vec<usize>| mean(set.iter().map(|i| chance[members[seen[*i]]])).unwrap_or(0.0);
+        skeleton.sets.iter().map(of_set).collect()
+    });
+    let division = Division::of(&own, skeleton, &hangs, LEAST * grain, habit, main);
     let mut owner: Vec<usize> = node_of.iter().map(|node| division.organ_of[*node]).collect();
     for track in division.tracks() {
         track.follow(&own, &search, grain, |i| &division.skeleton.sets[node_of[i]], &mut owner);
@@ -94,10 +103,20 @@ struct Division {
     least: f64,
     organ_of: Vec<usize>,
     organs: usize,
+    /// What the way to each node and on gains by being the main stem's: metres that are likelier so than not, less the
+    /// others. 0 everywhere when nothing is known.
+    main: Vec<f64>,
 }
 
 impl Division {
-    fn of(points: &[DVec3], skeleton: Skeleton, hangs: &[(usize, f64)], least: f64, habit: Habit) -> Self {
+    fn of(
+        points: &[DVec3],
+        skeleton: Skeleton,
+        hangs: &[(usize, f64)],
+        least: f64,
+        habit: Habit,
+        main: Option<Vec<f64>>,
+    ) -> Self {
         let n = skeleton.sets.len();
         let mut children = vec![Vec::new(); n];
         for (k, parent) in skeleton.parent.iter().enumerate() {
@@ -118,10 +137,12 @@ impl Division {
             least,
             organ_of: vec![0; n],
             organs: 1,
+            main: vec![0.0; n],
             skeleton,
         };
         division.count_leaves(hangs, habit);
         division.count_sides();
+        division.follow_main(main);
         division.walk();
         division
     }
@@ -165,6 +186,18 @@ impl Division {
         }
     }
 
+    /// Sums the main stem's chances from the tips down.
+    fn follow_main(&mut self, chance: Option<Vec<f64>>) {
+        let Some(chance) = chance else { return };
+        for k in (0..chance.len()).rev() {
+            let Some(p) = self.skeleton.parent[k] else { continue };
+            let step = self.skeleton.centres[k].distance(self.skeleton.centres[p]);
+            let gain = self.main[k] + step * (2.0 * chance[k] - 1.0);
+            self.main[p] = self.main[p].max(gain);
+            self.main[k] = gain;
+        }
+    }
+
     /// Gives nodes to organs, from the base on: at a fork the organ goes on along one child, and every other child
     /// long enough starts an organ of its own.
     fn walk(&mut self) {
@@ -200,6 +233,11 @@ impl Division {
     /// them), of equal ones that with most leaves, and then the straightest. A main stem or branch ends at its last fork
     /// unless one child goes straight on.
     fn onward(&self, k: usize, organ: usize, branches: &[usize]) -> Option<usize> {
+        // The foot's is what the best way up gains.
+        if organ == 0 && self.main[0] > 0.0 {
+            let best = self.children[k].iter().copied().max_by(|a, b| self.main[*a].total_cmp(&self.main[*b]));
+            return best.filter(|c| self.main[*c] > 0.0);
+        }
         let turn = |c: usize| self.straightness(k, c);
         let better = |a: &usize, b: &usize| {
             let most = |x: usize| (self.sides[x], self.leaves[x].max(1));
@@ -281,7 +319,7 @@ mod tests {
             blades.push((start..points.len()).collect::<Vec<usize>>());
         }
         let members: Vec<usize> = (0..stems).collect();
-        let organs = split(&points, &members, &blades, DVec3::ZERO, Habit::Simple);
+        let organs = split(&points, &members, &blades, DVec3::ZERO, Habit::Simple, None);
         assert_eq!(organs.len(), 4);
         let main = &organs[0].points;
         assert!(main.iter().any(|p| p.z > 0.29) && main.iter().all(|p| p.x < 0.03), "it follows the petiole");

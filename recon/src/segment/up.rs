@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::check;
 use super::foot::{self, Foot};
 
 /// The vertical of a cloud's frame.
@@ -14,6 +15,12 @@ pub enum Up {
 }
 
 impl Up {
+    /// The unit vertical of a cloud of which nothing else is known; z of one that is no plant.
+    #[must_use]
+    pub fn of(self, points: &[DVec3]) -> DVec3 {
+        check(points).map_or(DVec3::Z, |()| self.resolve(points, None).0)
+    }
+
     /// The unit vertical, and the foot. Found: the axis nearest to the direction in which the stalk leaves its foot.
     pub(super) fn resolve(self, points: &[DVec3], is_stem: Option<&[bool]>) -> (DVec3, Foot) {
         match self {

@@ -16,6 +16,7 @@ mod learn;
 mod left_out;
 mod meshes;
 mod odd_blades;
+mod predicted;
 mod records;
 mod segmenting;
 mod traits;

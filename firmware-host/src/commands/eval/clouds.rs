@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use demeter_recon::cloud::PointCloud;
 use demeter_recon::model::Species;
 use demeter_recon::organs::{OrganTree, ScaleSource};
-use demeter_recon::segment::{Labels, Up, segment};
+use demeter_recon::segment::{Labels, Up};
 use demeter_recon::{fit, species, tree};
 
 use crate::describe::{Described, Encoding, describe};
+use crate::divider::Divider;
 use crate::error::CommandError;
 use crate::files;
 
@@ -43,9 +44,16 @@ pub(super) struct Fitted {
 ///
 /// # Errors
 /// The reason in words, for the table's notes: a plant that cannot be fitted does not stop the others.
-pub(super) fn whole(cloud: &PointCloud, species: &Species, labels: Labels, up: Up) -> Result<Fitted, CommandError> {
+pub(super) fn whole(
+    cloud: &PointCloud,
+    species: &Species,
+    divider: &mut Divider,
+    labels: Labels,
+    up: Up,
+) -> Result<Fitted, CommandError> {
     let failed = |kind: &'static str, error: &dyn std::error::Error| CommandError::failed(kind, error);
-    let segmented = segment(cloud, species, labels, up).map_err(|error| failed("segmentation", &error))?;
+    let divided = divider.divide(cloud, species, labels, up).map_err(|error| failed("segmentation", &error))?;
+    let segmented = divided.segmented;
     let tree = tree::build(segmented.organs).map_err(|error| failed("topology", &error))?;
     let fitted = fit::plant(&tree, species, segmented.up).map_err(|error| failed("fit", &error))?;
     let source = fitted.organs.iter().map(|organ| organ.source).collect();

@@ -13,6 +13,7 @@ use super::baselines::{beziers, poisson, procedural, quadratics};
 use super::clouds::{Fitted, read, some, species_of, whole};
 use super::table::{Cell, Table};
 use super::{files_of, folder, picture, progress};
+use crate::divider::{Divider, OrganSource};
 use crate::error::CommandError;
 use crate::files;
 
@@ -28,6 +29,9 @@ pub(super) struct Args {
     /// Take every N-th cloud.
     #[arg(long, default_value_t = 1)]
     every: usize,
+    /// What finds organs where labels are not used.
+    #[arg(long, value_enum, default_value_t)]
+    organs: OrganSource,
     /// Also measure SimpleProc, a Bézier surface an organ and a quadratic patch an organ; seconds a cloud.
     #[arg(long)]
     baselines: bool,
@@ -66,6 +70,7 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
     let mut table = Table::new("fit", &columns);
     let clouds = args.clouds()?;
     let bar = progress(clouds.len());
+    let mut divider = Divider::new(args.organs);
     let mut scores: BTreeMap<(&str, &str), Vec<Scored>> = BTreeMap::new();
     for (path, metres, up) in clouds {
         bar.inc(1);
@@ -74,7 +79,7 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
             continue;
         };
         let cloud = read(&path, metres)?;
-        for (method, found) in args.methods(&path, &cloud, metres, &files::species(name)?, up) {
+        for (method, found) in args.methods(&path, &cloud, metres, &files::species(name)?, &mut divider, up) {
             match found {
                 Ok(scored) => scores.entry((name, method)).or_default().push(scored),
                 Err(reason) => table.notes.push(format!("{}, {method}: {reason}", path.display())),
@@ -123,12 +128,13 @@ impl Args {
         cloud: &PointCloud,
         metres: f64,
         species: &Species,
+        divider: &mut Divider,
         up: Up,
     ) -> Vec<(&'static str, Result<Scored, CommandError>)> {
         let mut found = Vec::new();
         let labelled = cloud.labels.is_some();
         let (labels, best) = if labelled { (Labels::Own, LABELS) } else { (Labels::None, NO_LABELS) };
-        let fitted = whole(cloud, species, labels, up);
+        let fitted = whole(cloud, species, divider, labels, up);
         if let (Ok(fitted), Some(folder)) = (&fitted, &self.pictures) {
             let name = path.with_extension("png").file_name().map(|name| folder.join(name)).unwrap_or_default();
             if let Err(error) = picture::write(&name, &cloud.points, fitted) {
@@ -136,7 +142,7 @@ impl Args {
             }
         }
         if labelled {
-            found.push((NO_LABELS, whole(cloud, species, Labels::None, up).and_then(|fitted| ours(&fitted))));
+            found.push((NO_LABELS, whole(cloud, species, divider, Labels::None, up).and_then(|fitted| ours(&fitted))));
         }
         if let (Ok(fitted), true) = (&fitted, self.baselines) {
             let up = fitted.described.plant.world_from_plant.rotation * DVec3::Z;

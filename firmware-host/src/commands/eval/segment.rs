@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use demeter_recon::cloud::{PointCloud, PointOrgan};
 use demeter_recon::metrics::{Division, MIN_SEEN_POINTS, stems_merged};
 use demeter_recon::model::OrganKind;
-use demeter_recon::segment::{Labels, Segmented, Up, segment};
+use demeter_recon::segment::{Labels, Up};
 use demeter_recon::statistics::mean;
 use glam::DVec3;
 
@@ -14,6 +14,7 @@ use super::clouds::{read, some, species_of};
 use super::release::{self, Released};
 use super::table::{Cell, Table};
 use super::{files_of, folder, picture, progress};
+use crate::divider::{Divided, Divider, OrganSource};
 use crate::error::CommandError;
 use crate::files;
 
@@ -36,6 +37,9 @@ pub(super) struct Args {
     /// Take every N-th cloud.
     #[arg(long, default_value_t = 1)]
     every: usize,
+    /// What finds the organs; both, a row each, when not given.
+    #[arg(long, value_enum)]
+    organs: Option<OrganSource>,
     /// Draw the truth of each cloud beside what was found into this folder. Pictures of the shared data stay out of the
     /// project.
     #[arg(long, value_name = "FOLDER")]
@@ -72,6 +76,7 @@ struct Sums {
 pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
     let columns = [
         "species",
+        "organs by",
         "clouds",
         "instances",
         "precision",
@@ -83,7 +88,9 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
         "right stems",
     ];
     let mut table = Table::new("segment", &columns);
-    let mut rows: BTreeMap<String, Sums> = BTreeMap::new();
+    let mut rows: BTreeMap<(String, OrganSource), Sums> = BTreeMap::new();
+    let sources = args.organs.map_or(vec![OrganSource::Network, OrganSource::Geometry], |source| vec![source]);
+    let mut dividers: Vec<(OrganSource, Divider)> = sources.into_iter().map(|by| (by, Divider::new(by))).collect();
     let paths = args.clouds()?;
     let bar = progress(paths.len());
     let released = args.release.iter().map(release::plants).collect::<Result<Vec<_>, _>>()?;
@@ -91,26 +98,33 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
     for case in paths.iter().map(|(path, metres, up)| Case::read(path, *metres, *up)).chain(released) {
         bar.inc(1);
         let Some(case) = case? else { continue };
-        match case.divided() {
-            Ok(segmented) => {
-                let found = segmented.of_points(case.truth.len());
-                if let Some(folder) = &args.pictures {
-                    let name = case.path.with_extension("png").file_name().map(|name| folder.join(name));
-                    picture::divisions(
-                        &name.unwrap_or_default(),
-                        &case.cloud.points,
-                        segmented.up,
-                        [&case.truth, &found],
-                    )?;
+        for (by, divider) in &mut dividers {
+            let segmented = match case.divided(divider) {
+                Ok(Divided { segmented, degraded: None, .. }) => segmented,
+                // The row would be geometry's; one cloud says why there is none.
+                Ok(Divided { degraded: Some(reason), .. }) => {
+                    if !table.notes.contains(&reason) {
+                        table.notes.push(reason);
+                    }
+                    continue;
                 }
-                for name in [case.name.as_str(), "all"] {
-                    rows.entry(name.into()).or_default().add(&case, &found);
+                Err(reason) => {
+                    table.notes.push(format!("{}: {reason}", case.path.display()));
+                    continue;
                 }
+            };
+            let found = segmented.of_points(case.truth.len());
+            if let Some(folder) = &args.pictures {
+                let name = case.path.file_stem().unwrap_or_default().to_string_lossy();
+                let path = folder.join(format!("{name}-{}.png", by.name()));
+                picture::divisions(&path, &case.cloud.points, segmented.up, [&case.truth, &found])?;
             }
-            Err(reason) => table.notes.push(format!("{}: {reason}", case.path.display())),
+            for name in [case.name.as_str(), "all"] {
+                rows.entry((name.into(), *by)).or_default().add(&case, &found);
+            }
         }
     }
-    table.rows = rows.iter().map(|(name, sums)| sums.row(name)).collect();
+    table.rows = rows.iter().map(|((name, by), sums)| sums.row(name, *by)).collect();
     let goals = GOALS.map(|(name, goal)| format!("{name} {goal:.2}")).join(", ");
     table.notes.push(format!("goals, at least: {goals}"));
     table.notes.push(format!(
@@ -167,8 +181,9 @@ impl Case {
         Self { path: folder, name: release::NAME.into(), species: "soybean", cloud, truth, up: Up::Axis(DVec3::Z) }
     }
 
-    fn divided(&self) -> Result<Segmented, CommandError> {
-        segment(&self.cloud, &files::species(self.species)?, Labels::None, self.up)
+    fn divided(&self, divider: &mut Divider) -> Result<Divided, CommandError> {
+        divider
+            .divide(&self.cloud, &files::species(self.species)?, Labels::None, self.up)
             .map_err(|error| CommandError::failed("segmentation", &error))
     }
 
@@ -191,10 +206,11 @@ impl Sums {
         self.blades.push(blades(found) - blades(&case.truth));
     }
 
-    fn row(&self, name: &str) -> Vec<Cell> {
+    fn row(&self, name: &str, by: OrganSource) -> Vec<Cell> {
         let division = &self.division;
         vec![
             name.into(),
+            by.name().into(),
             Cell::Count(self.clouds),
             Cell::Count(division.truth),
             Cell::figure(division.precision(), 3),

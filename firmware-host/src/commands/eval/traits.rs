@@ -14,6 +14,7 @@ use super::clouds::{Fitted, read, some, whole};
 use super::table::{Cell, Table};
 use super::truth::{Kind, Truth};
 use super::{files_of, folder, progress};
+use crate::divider::{Divider, OrganSource};
 use crate::error::CommandError;
 use crate::files;
 
@@ -78,6 +79,7 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
     let mut table = Table::new("traits", &columns);
     let paths = some(files_of(&folder(Some(&args.truth), "", "--truth")?, "json")?, args.every);
     let bar = progress(paths.len());
+    let mut divider = Divider::new(OrganSource::Geometry);
     let (mut samples, mut spoiled, mut blades, mut small, mut unfitted) = (Vec::new(), false, 0, 0, 0);
     for path in paths {
         bar.inc(1);
@@ -87,13 +89,14 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
         }
         spoiled |= truth.noise_m > 0.0 || truth.missing > 0.0;
         let cloud = read(&cloud_path, 1.0)?;
-        let fitted = match whole(&cloud, &files::species(&truth.species)?, Labels::Own, Up::Axis(DVec3::Z)) {
-            Ok(fitted) => fitted,
-            Err(reason) => {
-                table.notes.push(format!("{}: {reason}", cloud_path.display()));
-                continue;
-            }
-        };
+        let fitted =
+            match whole(&cloud, &files::species(&truth.species)?, &mut divider, Labels::Own, Up::Axis(DVec3::Z)) {
+                Ok(fitted) => fitted,
+                Err(reason) => {
+                    table.notes.push(format!("{}: {reason}", cloud_path.display()));
+                    continue;
+                }
+            };
         let labels = cloud.labels.unwrap_or_default();
         let matched = matched(&fitted, &truth, |point| labels.get(point as usize).copied().unwrap_or(0));
         for organ in truth.organs.iter().filter(|organ| organ.kind == Kind::Blade) {
