@@ -6,11 +6,12 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use demeter_frame::{Intrinsics, Pinhole};
 use demeter_recon::species::shipped;
-use demeter_recon::world::{Row, Sensor, boundary_distance, render, row, seeded, training_view};
+use demeter_recon::world::{Nursery, Row, Sensor, boundary_distance, render, row, seeded, training_view};
 
 fn pictures(c: &mut Criterion) {
     let soybean = shipped("soybean").expect("listed").expect("valid");
     let maize = shipped("maize").expect("listed").expect("valid");
+    let nursery = Nursery::new(vec![soybean.clone(), maize]);
     let intrinsics = Intrinsics::from_hfov(640, 480, 1.0);
     let mut group = c.benchmark_group("render 640x480");
     group.sample_size(10);
@@ -28,12 +29,12 @@ fn pictures(c: &mut Criterion) {
     group.bench_function("48 views", |b| {
         b.iter(|| {
             (0..48)
-                .filter_map(|seed| training_view(&soybean, &maize, 256, seed).ok())
+                .filter_map(|seed| training_view(&nursery, 256, seed).ok())
                 .map(|(view, _)| view.organs.len())
                 .sum::<usize>()
         });
     });
-    let (view, _) = training_view(&soybean, &maize, 256, 5).expect("valid");
+    let (view, _) = training_view(&nursery, 256, 5).expect("valid");
     group.bench_function("boundary distance", |b| b.iter(|| boundary_distance(black_box(&view.instances))));
     group.finish();
 }

@@ -9,8 +9,8 @@ uvs [V,2] f32, v downwards in the picture; faces [F,3] u32; organ [F] u16, an or
 3 main stem; texture [O] i16, an index into the metadata's `textures` (names separated by spaces, of files in
 FOLDER/textures), -1 for none. Where a texture's alpha is below one half there is no leaf.
 FOLDER/textures/*.png: the generator's leaf scans with alpha, smaller.
-FOLDER/blades/{broad,grass}_*.png: scans straightened, the base's row first, each row the blade from margin to margin:
-what the blades of our own plants look like.
+FOLDER/blades/{broad,grass}_*.png: scans straightened, the base's row first, each row the blade from margin to margin,
+transparent where insects ate: what the blades of our own plants look like.
 
 Plant k of a species has seed SEED + k and an age drawn from that seed. A plant whose file is there already is not grown
 again, so a stopped run continues.
@@ -34,6 +34,8 @@ AGES = {
 }
 TEXTURE_SIDE = 192
 BLADE_SIZE = (64, 128)
+# Scanned leaflets lie on white: what is lighter than this in all colours is a hole.
+HOLE = 170
 # The semantic classes of demeter-frame, by the kinds of plant.py.
 SEMANTIC = {MAIN_STEM: 3, BLADE: 1}
 STEM_SEMANTIC = 2
@@ -104,17 +106,18 @@ def write_texture(folder, file):
 
 
 def write_blade(path, rgb, solid):
-    """The picture of a leaf with each of its rows stretched from margin to margin; nothing when the leaf has gaps."""
+    """The picture of a leaf with each of its rows stretched from margin to margin, holes transparent."""
     # A stub of petiole is no blade: only rows at least a tenth as wide as the widest count.
     width = solid.sum(1)
     rows = np.flatnonzero(width >= 0.1 * width.max())
-    straight = np.zeros((len(rows), BLADE_SIZE[0], 3), np.uint8)
+    straight = np.full((len(rows), BLADE_SIZE[0], 4), 255, np.uint8)
     for k, row in enumerate(rows):
         columns = np.flatnonzero(solid[row])
         # A pixel inside the margin, whose colour is mixed with the background's.
         inner = columns[2:-2] if len(columns) > 8 else columns
-        straight[k] = rgb[row, inner[np.linspace(0, len(inner) - 1, BLADE_SIZE[0]).astype(int)]]
-    Image.fromarray(straight).resize(BLADE_SIZE, Image.BILINEAR).save(path)
+        straight[k, :, :3] = rgb[row, inner[np.linspace(0, len(inner) - 1, BLADE_SIZE[0]).astype(int)]]
+    straight[..., 3] = np.where((straight[..., :3] > HOLE).all(-1), 0, 255)
+    Image.fromarray(straight).resize(BLADE_SIZE, Image.NEAREST).save(path)
 
 
 def main():

@@ -5,6 +5,7 @@ use clap::Subcommand;
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
+mod assets;
 mod clouds;
 mod images;
 mod plant;

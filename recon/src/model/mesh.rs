@@ -11,6 +11,8 @@ use super::leaf::{COLUMNS, ROWS};
 pub enum Detail {
     /// Every 4th row and 7th column of a blade, 6-sided stems: for rendering many plants at a distance.
     Coarse,
+    /// Every row and every 7th column of a blade, 6-sided stems: for margins that wave.
+    Rows,
     /// The control points themselves, 8-sided stems.
     Control,
     /// Catmull-Rom with this many steps between control points.
@@ -97,12 +99,12 @@ impl PlantMesh {
 
     fn add_stem(&mut self, control: &[DVec3], radius: f64, side: DVec3, detail: Detail, knots: Knots) {
         let (sides, steps) = match detail {
-            Detail::Coarse => (6, 1),
+            Detail::Coarse | Detail::Rows => (6, 1),
             Detail::Control => (8, 1),
             Detail::Refined(steps) => (12, steps),
         };
         let mut curve = refine(control, steps, knots);
-        if detail == Detail::Coarse {
+        if matches!(detail, Detail::Coarse | Detail::Rows) {
             let last = curve[curve.len() - 1];
             curve = curve.into_iter().step_by(4).collect();
             curve.push(last);
@@ -157,9 +159,10 @@ impl PlantMesh {
 
 fn blade_points(control: &[DVec3], detail: Detail, knots: Knots) -> (usize, usize, Vec<DVec3>) {
     match detail {
-        Detail::Coarse => {
-            let points = (0..ROWS).step_by(4).flat_map(|i| (0..COLUMNS).step_by(7).map(move |j| (i, j)));
-            ((ROWS - 1) / 4 + 1, (COLUMNS - 1) / 7 + 1, points.map(|(i, j)| control[i * COLUMNS + j]).collect())
+        Detail::Coarse | Detail::Rows => {
+            let step = if detail == Detail::Coarse { 4 } else { 1 };
+            let points = (0..ROWS).step_by(step).flat_map(|i| (0..COLUMNS).step_by(7).map(move |j| (i, j)));
+            ((ROWS - 1) / step + 1, (COLUMNS - 1) / 7 + 1, points.map(|(i, j)| control[i * COLUMNS + j]).collect())
         }
         Detail::Control => (ROWS, COLUMNS, control.to_vec()),
         Detail::Refined(steps) => {

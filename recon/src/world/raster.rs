@@ -1,6 +1,8 @@
 //! The z-buffer: which face each pixel sees.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+
+use super::Texture;
 
 /// No face.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -22,7 +24,12 @@ impl Buffer {
     }
 
     /// Draws a triangle of (x, y in pixels, key); where it covers a pixel's centre the larger key wins.
-    pub(crate) fn fill(&mut self, [a, b, c]: [Vec3; 3], face: u32) {
+    pub(crate) fn fill(&mut self, corners: [Vec3; 3], face: u32) {
+        self.fill_where(corners, face, |_| true);
+    }
+
+    /// As [`Self::fill`], only where `solid` says so of the corners' weights in the picture.
+    fn fill_where(&mut self, [a, b, c]: [Vec3; 3], face: u32, solid: impl Fn([f32; 3]) -> bool) {
         let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
         if !(area.abs() > 1e-12 && area.is_finite()) {
             return;
@@ -56,7 +63,7 @@ impl Buffer {
                 inside = true;
                 let key = a.z + v * (b.z - a.z) + w * (c.z - a.z);
                 let n = y * self.width + x;
-                if key > self.key[n] {
+                if key > self.key[n] && solid([1.0 - v - w, v, w]) {
                     self.key[n] = key;
                     self.face[n] = face;
                 }
@@ -66,30 +73,67 @@ impl Buffer {
 
     /// Draws a triangle of the camera frame in perspective with focal lengths and centre in pixels; the key is 1/z.
     /// What lies nearer than [`NEAR`] is cut off.
-    pub(crate) fn fill_perspective(&mut self, corners: [Vec3; 3], [fx, fy, cx, cy]: [f32; 4], face: u32) {
-        let project = |p: Vec3| Vec3::new(fx * p.x / p.z + cx, fy * p.y / p.z + cy, 1.0 / p.z);
-        let behind = corners.iter().filter(|p| p.z < NEAR).count();
+    pub(crate) fn fill_perspective(&mut self, corners: [Vec3; 3], lens: [f32; 4], face: u32) {
+        self.perspective(corners.map(|at| (at, Vec2::ZERO)), lens, |buffer, corners| {
+            buffer.fill(corners.map(|(at, _)| at), face);
+        });
+    }
+
+    /// As [`Self::fill`], only where the texture is solid; uv is linear in the picture.
+    pub(super) fn fill_cut(&mut self, corners: [Vec3; 3], face: u32, (texture, uvs): (&Texture, [Vec2; 3])) {
+        self.fill_where(corners, face, |w| texture.is_solid(uvs[0] * w[0] + uvs[1] * w[1] + uvs[2] * w[2]));
+    }
+
+    /// As [`Self::fill_perspective`], only where the texture is solid.
+    pub(super) fn fill_perspective_cut(
+        &mut self,
+        corners: [Vec3; 3],
+        lens: [f32; 4],
+        face: u32,
+        (texture, uvs): (&Texture, [Vec2; 3]),
+    ) {
+        let corners = [0, 1, 2].map(|i| (corners[i], uvs[i]));
+        self.perspective(corners, lens, |buffer, corners| {
+            // uv / z and 1 / z are linear in the picture, uv is not.
+            let uvs = corners.map(|(at, uv)| (uv * at.z).extend(at.z));
+            buffer.fill_where(corners.map(|(at, _)| at), face, |w| {
+                let uv = uvs[0] * w[0] + uvs[1] * w[1] + uvs[2] * w[2];
+                texture.is_solid(uv.truncate() / uv.z)
+            });
+        });
+    }
+
+    /// Cuts a triangle at the near plane and hands its one or two projected rests to `draw`.
+    fn perspective(
+        &mut self,
+        corners: [(Vec3, Vec2); 3],
+        [fx, fy, cx, cy]: [f32; 4],
+        draw: impl Fn(&mut Self, [(Vec3, Vec2); 3]),
+    ) {
+        let project = |(p, uv): (Vec3, Vec2)| (Vec3::new(fx * p.x / p.z + cx, fy * p.y / p.z + cy, 1.0 / p.z), uv);
+        let behind = corners.iter().filter(|(p, _)| p.z < NEAR).count();
         if behind == 0 {
-            return self.fill(corners.map(project), face);
+            return draw(self, corners.map(project));
         }
         if behind == 3 {
             return;
         }
-        let mut cut = [Vec3::ZERO; 4];
+        let mut cut = [(Vec3::ZERO, Vec2::ZERO); 4];
         let mut count = 0;
         for i in 0..3 {
-            let (p, q) = (corners[i], corners[(i + 1) % 3]);
+            let ((p, p_uv), (q, q_uv)) = (corners[i], corners[(i + 1) % 3]);
             if p.z >= NEAR {
-                cut[count] = p;
+                cut[count] = (p, p_uv);
                 count += 1;
             }
             if (p.z >= NEAR) != (q.z >= NEAR) {
-                cut[count] = p.lerp(q, (NEAR - p.z) / (q.z - p.z));
+                let share = (NEAR - p.z) / (q.z - p.z);
+                cut[count] = (p.lerp(q, share), p_uv.lerp(q_uv, share));
                 count += 1;
             }
         }
         for i in 2..count {
-            self.fill([cut[0], cut[i - 1], cut[i]].map(project), face);
+            draw(self, [cut[0], cut[i - 1], cut[i]].map(project));
         }
     }
 }
@@ -99,6 +143,42 @@ mod tests {
     use super::*;
 
     const LENS: [f32; 4] = [50.0, 50.0, 32.0, 32.0];
+
+    /// A leaf of whose 10 x 10 texels the left half and one more are solid.
+    fn half() -> Texture {
+        let solid = |x: u32, y: u32| if x < 5 || (x, y) == (7, 2) { 255 } else { 0 };
+        let picture = image::RgbaImage::from_fn(10, 10, |x, y| image::Rgba([0, 99, 0, solid(x, y)]));
+        Texture::new(&picture).expect("some of it is solid")
+    }
+
+    #[test]
+    fn a_cut_leaf_covers_the_area_that_its_picture_shows() {
+        let at = |x: f32, y: f32| Vec3::new(x, y, 1.0);
+        let uv = |x: f32, y: f32| Vec2::new(x, y);
+        let quad = [at(-0.4, -0.4), at(0.4, -0.4), at(0.4, 0.4), at(-0.4, 0.4)];
+        let uvs = [uv(0.0, 0.0), uv(1.0, 0.0), uv(1.0, 1.0), uv(0.0, 1.0)];
+        let covered = |tilt: f32| {
+            let mut buffer = Buffer::new(400, 400, 0.0);
+            for k in [[0, 1, 2], [0, 2, 3]] {
+                let corners = k.map(|i| quad[i] + Vec3::Z * tilt * quad[i].x);
+                buffer.fill_perspective_cut(corners, [300.0, 300.0, 200.0, 200.0], 1, (&half(), k.map(|i| uvs[i])));
+            }
+            let drawn = |x: std::ops::Range<usize>| {
+                (0..400)
+                    .flat_map(|y| x.clone().map(move |x| (x, y)))
+                    .filter(|(x, y)| buffer.face[y * 400 + x] == 1)
+                    .count()
+            };
+            (drawn(0..200), drawn(200..400))
+        };
+        // 240 x 240 pixels, 51 of 100 texels.
+        assert_eq!(covered(0.0), (240 * 120, 24 * 24));
+        // Turned away, the texture's middle stays where the quad's middle is: only perspective-correct uv does that.
+        let (left, right) = covered(0.9);
+        let whole_left: f32 = 300.0 * 300.0 * 0.5 * (0.4 / 0.64) * (0.8 + 0.8 / 0.64);
+        assert!((left as f32 / whole_left - 1.0).abs() < 0.01, "{left} {whole_left}");
+        assert!(right > 100 && right < 24 * 24, "{right}");
+    }
 
     #[test]
     fn nearer_faces_win_in_any_order_and_cut_ones_stay_in_bounds() {

@@ -5,12 +5,12 @@ use image::GrayImage;
 use super::raster::{Buffer, NONE};
 use super::scene::Scene;
 use super::shade::{self, Spot};
-use super::{Seeded, Sensor};
+use super::{Seeded, Sensor, backdrop};
 
 /// An organ of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct OrganRef {
-    /// Index of the plant in [`Scene::plants`].
+    /// Index of the plant: in [`Scene::plants`], or among the meshes that the scene was made of.
     pub plant: u32,
     /// Index of the organ in the plant.
     pub organ: u32,
@@ -94,7 +94,11 @@ fn look(scene: &Scene, camera: &Pinhole) -> Vec<Sample> {
     let in_camera: Vec<Vec3> = scene.positions.iter().map(|p| camera_from_world * (*p - eye)).collect();
     let mut buffer = Buffer::new(width as usize, height as usize, 0.0);
     for (n, face) in scene.faces.iter().enumerate() {
-        buffer.fill_perspective(face.map(|v| in_camera[v as usize]), lens, n as u32);
+        let corners = face.map(|v| in_camera[v as usize]);
+        match scene.cutout(n) {
+            None => buffer.fill_perspective(corners, lens, n as u32),
+            Some(cutout) => buffer.fill_perspective_cut(corners, lens, n as u32, cutout),
+        }
     }
     let mut samples = Vec::with_capacity(buffer.face.len());
     for (n, (face, inverse)) in buffer.face.iter().zip(&buffer.key).enumerate() {
@@ -102,9 +106,9 @@ fn look(scene: &Scene, camera: &Pinhole) -> Vec<Sample> {
         // Its z in the camera is 1, so distances along it are depths.
         let ray = world_from_camera * Vec3::new((at.x - lens[2]) / lens[0], (at.y - lens[3]) / lens[1], 1.0);
         // Leaves that hang below the ground are hidden by it.
-        let buried = *face != NONE && shade::ground_distance(scene, eye, ray) * inverse < 1.0;
+        let buried = *face != NONE && backdrop::ground_distance(scene, eye, ray) * inverse < 1.0;
         samples.push(if *face == NONE || buried {
-            let seen = shade::background(scene, eye, ray);
+            let seen = backdrop::background(scene, eye, ray);
             let depth = if seen.distance.is_finite() { seen.distance } else { 0.0 };
             Sample { light: seen.colour, depth, instance: 0 }
         } else {
@@ -138,7 +142,7 @@ mod tests {
     use super::*;
     use crate::model::{Detail, Form, Knots, PlantMesh, Species, forward};
     use crate::species::shipped;
-    use crate::world::{Row, Setting, row, seeded, training_view};
+    use crate::world::{Nursery, Row, Setting, row, seeded, training_view};
     use glam::DVec3;
 
     fn soybean() -> Species {
@@ -157,8 +161,8 @@ mod tests {
     #[test]
     fn the_same_seed_gives_the_same_bytes_and_another_does_not() {
         assert_eq!(sample(&Sensor::FIELD).2, sample(&Sensor::FIELD).2);
-        let maize = shipped("maize").expect("listed").expect("valid");
-        let view = |seed| training_view(&soybean(), &maize, 48, seed).expect("valid").0;
+        let nursery = Nursery::new(vec![soybean(), shipped("maize").expect("listed").expect("valid")]);
+        let view = |seed| training_view(&nursery, 48, seed).expect("valid").0;
         assert!((0..8).all(|seed| view(seed) == view(seed) && view(seed) != view(seed + 1)));
     }
 

@@ -1,12 +1,12 @@
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use demeter_frame::{Intrinsics, Pose};
 use glam::{DQuat, DVec3, Vec3};
 use rand::Rng;
 
-use super::scene::{Backdrop, Ground, Light, Pot, Scene, Setting, WorldError};
-use super::surface::Surface;
-use super::{Seeded, grow, seeded};
+use super::scene::{Ground, Scene, Setting, WorldError};
+use super::weather::daylight;
+use super::{Backdrop, Seeded, Surface, grow, seeded};
 use crate::model::{Detail, Plant, Species};
 
 /// A row to be driven past.
@@ -65,42 +65,15 @@ pub fn row(
     Ok((scene, poses))
 }
 
-/// How a potted plant is shown.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lab {
-    /// The wall behind it.
-    pub wall: Surface,
-    /// Height of the floor, metres; far below the pot it is never seen.
-    pub floor: f64,
-    /// The pot.
-    pub pot: Pot,
-    /// The light.
-    pub light: Light,
-}
-
-/// A single potted plant before a wall 1 m behind it, to be looked at along +y.
-///
-/// # Errors
-/// [`WorldError`] when the plant is none.
-pub fn lab(species: &Species, plant: Plant, lab: &Lab, seed: u64) -> Result<Scene, WorldError> {
-    let setting = Setting {
-        ground: Ground { z: lab.floor, surface: Surface::Plain { colour: Vec3::splat(0.35) } },
-        backdrop: Backdrop::Wall { distance: 1.5, surface: lab.wall },
-        pot: Some(lab.pot),
-        light: lab.light,
-    };
-    Scene::new(vec![(species, plant)], setting, Detail::Coarse, seed)
-}
-
 /// Soil under a random sky.
 pub(super) fn field(rng: &mut Seeded) -> Setting {
-    let brown = Vec3::new(0.17, 0.12, 0.08).lerp(Vec3::new(0.2, 0.18, 0.16), rng.random());
+    let brown = Vec3::new(0.17, 0.12, 0.08).lerp(Vec3::new(0.2, 0.19, 0.18), rng.random());
     Setting {
         ground: Ground {
             z: 0.0,
             surface: Surface::Soil {
                 colour: brown * rng.random_range(0.5f32..1.8),
-                stones: rng.random_range(0.0f32..0.8).powi(2),
+                stones: rng.random_range(0.0f32..0.95).powi(2),
                 straw: rng.random_range(0.0f32..0.6).powi(2),
                 weeds: if rng.random_bool(0.3) { rng.random_range(0.0..0.2) } else { 0.0 },
             },
@@ -108,24 +81,8 @@ pub(super) fn field(rng: &mut Seeded) -> Setting {
         backdrop: Backdrop::Sky { brightness: rng.random_range(0.8..2.5) },
         pot: None,
         light: daylight(rng),
+        shade: None,
     }
-}
-
-/// From a clear noon to an overcast day.
-pub(super) fn daylight(rng: &mut Seeded) -> Light {
-    let cloud: f32 = rng.random();
-    let warm = Vec3::new(1.0, rng.random_range(0.85..0.97), rng.random_range(0.7..0.92));
-    Light {
-        to_sun: direction(rng.random_range(0.0..TAU), rng.random_range(0.3..1.4)),
-        sun: warm * (2.6 * (1.0 - cloud * cloud)),
-        ambient: Vec3::new(0.8, 0.9, 1.0) * (0.45 + 0.5 * cloud),
-    }
-}
-
-/// The unit vector at an azimuth and height above the horizon.
-pub(super) fn direction(azimuth: f64, height: f64) -> Vec3 {
-    let (sin, cos) = height.min(0.5 * PI).sin_cos();
-    DVec3::new(azimuth.cos() * cos, azimuth.sin() * cos, sin).as_vec3()
 }
 
 /// A plant moved from the origin to `at` and turned about the vertical.

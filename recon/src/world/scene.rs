@@ -1,12 +1,12 @@
-use glam::{Vec2, Vec3};
+use std::borrow::Cow;
+
+use glam::{Quat, Vec2, Vec3};
 use rand::Rng;
 
-use demeter_frame::Semantic;
-
-use super::shade::Shadow;
-use super::surface::Surface;
-use super::{Seeded, seeded};
-use crate::model::{Detail, Knots, OrganKind, Plant, PlantError, PlantMesh, Species, forward};
+use super::look::{Look, Variety, looks};
+use super::shadow::Shadow;
+use super::{Backdrop, LabelledMesh, Light, Pot, Shade, StandingMesh, Surface, Texture, seeded};
+use crate::model::{Detail, Plant, PlantError, Species};
 
 /// Why plants make no scene.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -38,45 +38,6 @@ pub struct Ground {
     pub surface: Surface,
 }
 
-/// What is seen above and behind the ground.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Backdrop {
-    /// Sky of this brightness, without depth.
-    Sky {
-        /// Linear brightness overhead.
-        brightness: f32,
-    },
-    /// A vertical wall at y = `distance` that gives its own light, as the back of an imaging chamber does.
-    Wall {
-        /// Metres along +y.
-        distance: f64,
-        /// What it looks like.
-        surface: Surface,
-    },
-}
-
-/// A cylinder that narrows downwards; its filled top is 1 cm under the plant's base.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pot {
-    /// Radius of the rim, metres.
-    pub radius: f64,
-    /// Height, metres.
-    pub height: f64,
-    /// Linear reflectance.
-    pub colour: Vec3,
-}
-
-/// A sun and the light from everywhere else.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Light {
-    /// Unit vector to the sun.
-    pub to_sun: Vec3,
-    /// Linear colour of the sun.
-    pub sun: Vec3,
-    /// Linear colour of the rest.
-    pub ambient: Vec3,
-}
-
 /// Everything but the plants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
@@ -88,6 +49,8 @@ pub struct Setting {
     pub pot: Option<Pot>,
     /// What lights them.
     pub light: Light,
+    /// What is not seen and throws its shadow on them.
+    pub shade: Option<Shade>,
 }
 
 impl Setting {
@@ -102,6 +65,7 @@ impl Setting {
             sun: Vec3::splat(1.2),
             ambient: Vec3::splat(0.6),
         },
+        shade: None,
     };
 }
 
@@ -114,22 +78,9 @@ pub struct Standing {
     pub species: String,
 }
 
-/// How an instance looks; instance 0 is the pots.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Look {
-    pub semantic: Semantic,
-    pub plant: u32,
-    pub organ: u32,
-    pub colour: Vec3,
-    pub vein: f32,
-    pub yellow: f32,
-    pub gloss: f32,
-    pub seed: u32,
-}
-
 /// Plants on ground before a backdrop, meshed and lit.
 pub struct Scene {
-    /// The plants, in order of their instances.
+    /// The plants of the model, in order of their instances; empty in a scene of labelled meshes.
     pub plants: Vec<Standing>,
     /// Everything else.
     pub setting: Setting,
@@ -155,19 +106,38 @@ impl Scene {
         detail: Detail,
         seed: u64,
     ) -> Result<Self, WorldError> {
+        let mut meshes = Vec::with_capacity(plants.len());
+        for (index, (species, plant)) in plants.iter().enumerate() {
+            let error = |error| WorldError::Plant { plant: index, error };
+            let mesh = LabelledMesh::of(plant, species, detail).map_err(error)?;
+            let foot = plant.world_from_plant.translation.as_vec3();
+            meshes.push(Placed {
+                mesh: Cow::Owned(mesh),
+                rotation: Quat::IDENTITY,
+                offset: Vec3::ZERO,
+                scale: 1.0,
+                foot,
+            });
+        }
+        let mut scene = Self::placed(&meshes, setting, seed)?;
+        let standing = |(species, plant): (&Species, Plant)| Standing { plant, species: species.name.clone() };
+        scene.plants = plants.into_iter().map(standing).collect();
+        Ok(scene)
+    }
+
+    /// Stands labelled meshes in a setting; `seed` decides colours.
+    ///
+    /// # Errors
+    /// [`WorldError::TooManyOrgans`].
+    pub fn of_meshes(meshes: &[StandingMesh], setting: Setting, seed: u64) -> Result<Self, WorldError> {
+        Self::placed(&meshes.iter().map(Placed::of).collect::<Vec<_>>(), setting, seed)
+    }
+
+    fn placed(meshes: &[Placed<'_>], setting: Setting, seed: u64) -> Result<Self, WorldError> {
         let mut rng = seeded(seed);
-        let pot = Look {
-            semantic: Semantic::Background,
-            plant: 0,
-            organ: 0,
-            colour: setting.pot.map_or(Vec3::ZERO, |pot| pot.colour),
-            vein: 0.0,
-            yellow: 0.0,
-            gloss: 0.05,
-            seed: rng.random(),
-        };
+        let pot = Look::pot(setting.pot.map_or(Vec3::ZERO, |pot| pot.colour), &mut rng);
         let mut scene = Self {
-            plants: Vec::with_capacity(plants.len()),
+            plants: Vec::new(),
             setting,
             seed: rng.random(),
             positions: Vec::new(),
@@ -179,21 +149,19 @@ impl Scene {
             shadow: Shadow::none(),
         };
         let variety = Variety::random(&mut rng);
-        for (plant, (species, parameters)) in plants.into_iter().enumerate() {
-            let posed = forward(&parameters, species).map_err(|error| WorldError::Plant { plant, error })?;
+        for (plant, placed) in meshes.iter().enumerate() {
             let first = scene.looks.len();
-            let found = first - 1 + parameters.organs.len();
+            let found = first - 1 + placed.mesh.organs.len();
             if found > usize::from(u16::MAX) {
                 return Err(WorldError::TooManyOrgans { expected: usize::from(u16::MAX), found });
             }
-            let mesh = PlantMesh::of(&posed, detail, Knots::Uniform);
-            scene.looks.extend(looks(&parameters, &variety, plant as u32, &mut rng));
-            scene.add(&mesh, |face| (first + mesh.organ_of_face[face] as usize) as u16);
+            scene.looks.extend(looks(&placed.mesh.organs, &variety, plant as u32, &mut rng));
+            scene.add(placed, |face| (first + placed.mesh.organ_of_face[face] as usize) as u16);
             if let Some(pot) = setting.pot {
-                let mesh = pot_mesh(pot, parameters.world_from_plant.translation.as_vec3());
-                scene.add(&mesh, |_| 0);
+                let mesh = Cow::Owned(pot.mesh(placed.foot));
+                let at_home = Placed { mesh, rotation: Quat::IDENTITY, offset: Vec3::ZERO, scale: 1.0, ..*placed };
+                scene.add(&at_home, |_| 0);
             }
-            scene.plants.push(Standing { plant: parameters, species: species.name.clone() });
         }
         scene.shadow = Shadow::cast(&scene);
         Ok(scene)
@@ -212,100 +180,37 @@ impl Scene {
         }
     }
 
-    fn add(&mut self, mesh: &PlantMesh, instance: impl Fn(usize) -> u16) {
+    /// The texture that cuts a face out, and the face's corners in it.
+    pub(super) fn cutout(&self, face: usize) -> Option<(&Texture, [Vec2; 3])> {
+        let texture = self.looks[usize::from(self.instances[face])].texture.as_deref()?;
+        (texture.solid_share() < 1.0).then(|| (texture, self.faces[face].map(|v| self.uvs[v as usize])))
+    }
+
+    fn add(&mut self, placed: &Placed<'_>, instance: impl Fn(usize) -> u16) {
+        let Placed { mesh, rotation, offset, scale, .. } = placed;
         let first = self.positions.len() as u32;
-        self.positions.extend(mesh.positions.iter().map(|p| p.as_vec3()));
-        self.normals.extend(mesh.normals.iter().map(|n| n.as_vec3()));
-        self.uvs.extend(mesh.uvs.iter().map(|uv| uv.as_vec2()));
+        self.positions.extend(mesh.positions.iter().map(|p| *rotation * (*p * *scale) + *offset));
+        self.normals.extend(mesh.normals.iter().map(|n| *rotation * *n));
+        self.uvs.extend(&mesh.uvs);
         self.faces.extend(mesh.faces.iter().map(|face| face.map(|v| v + first)));
         self.instances.extend((0..mesh.faces.len()).map(instance));
     }
 }
 
-/// What the plants of one scene share: they are of one variety. Reflectances are about those of green leaves in red,
-/// green and blue (a guess from photographs).
-struct Variety {
-    green: Vec3,
-    stem: Vec3,
-    /// How far main stems go to purple, 0..=1.
-    purple: f32,
-    vein: f32,
-    gloss: f32,
+/// A mesh and where it is put.
+struct Placed<'a> {
+    mesh: Cow<'a, LabelledMesh>,
+    rotation: Quat,
+    offset: Vec3,
+    scale: f32,
+    /// Where its pot stands.
+    foot: Vec3,
 }
 
-impl Variety {
-    fn random(rng: &mut Seeded) -> Self {
-        // Yellower greens are also lighter.
-        let green = Vec3::new(0.055, 0.15, 0.035).lerp(Vec3::new(0.13, 0.26, 0.045), rng.random());
-        let green = green * Vec3::new(shift(rng, 0.15), shift(rng, 0.15), shift(rng, 0.4));
-        Self {
-            green,
-            stem: green.lerp(Vec3::new(0.22, 0.30, 0.11), rng.random_range(0.1..0.8)),
-            purple: if rng.random_bool(0.25) { rng.random_range(0.0..0.8) } else { 0.0 },
-            vein: rng.random_range(0.1..0.9),
-            gloss: rng.random_range(0.02..0.2),
-        }
+impl<'a> Placed<'a> {
+    fn of(standing: &'a StandingMesh) -> Self {
+        let offset = standing.world_from_mesh.translation.as_vec3();
+        let rotation = standing.world_from_mesh.rotation.as_quat();
+        Self { mesh: Cow::Borrowed(&*standing.mesh), rotation, offset, scale: standing.scale, foot: offset }
     }
-}
-
-/// A factor around 1.
-fn shift(rng: &mut Seeded, by: f32) -> f32 {
-    1.0 + by * (2.0 * rng.random::<f32>() - 1.0)
-}
-
-/// Colours of a plant's organs: each plant and organ a little different, the lowest leaves sometimes yellow.
-fn looks(plant: &Plant, variety: &Variety, index: u32, rng: &mut Seeded) -> Vec<Look> {
-    let own = Vec3::new(shift(rng, 0.12), shift(rng, 0.1), shift(rng, 0.12));
-    let yellow = if rng.random_bool(0.3) { rng.random_range(0.0..0.9) } else { 0.0 };
-    let organs = plant.organs.iter().enumerate().map(|(organ, parameters)| {
-        let (semantic, colour) = match parameters.kind() {
-            OrganKind::MainStem => (Semantic::MainStem, variety.stem.lerp(Vec3::new(0.13, 0.04, 0.05), variety.purple)),
-            OrganKind::Stem => (Semantic::Stem, variety.stem),
-            OrganKind::Leaf => (Semantic::Leaf, variety.green),
-        };
-        let low = 1.0 - organ as f32 / plant.organs.len() as f32;
-        let spots: f32 = rng.random();
-        Look {
-            semantic,
-            plant: index,
-            organ: organ as u32,
-            colour: colour * own * shift(rng, 0.2),
-            vein: variety.vein,
-            yellow: yellow * low * low * spots,
-            gloss: variety.gloss,
-            seed: rng.random(),
-        }
-    });
-    organs.collect()
-}
-
-fn pot_mesh(pot: Pot, at: Vec3) -> PlantMesh {
-    /// Sides of a pot.
-    const SIDES: u32 = 24;
-    let mut mesh = PlantMesh::default();
-    let (r, h) = (pot.radius, pot.height);
-    // Profile from the filling outwards, over the rim and down: radius, height, and the normal's radius and height.
-    let profile = [
-        (0.0, -0.01, 0.0, 1.0),
-        (0.92 * r, -0.01, 0.0, 1.0),
-        (0.92 * r, 0.01, -1.0, 0.0),
-        (r, 0.01, 0.0, 1.0),
-        (r, 0.0, 1.0, 0.0),
-        (0.8 * r, -h, 1.0, 0.0),
-    ];
-    for (radius, z, out, up) in profile {
-        for k in 0..SIDES {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(SIDES)).sin_cos();
-            mesh.positions.push(at.as_dvec3() + glam::DVec3::new(radius * cos, radius * sin, z));
-            mesh.normals.push(glam::DVec3::new(out * cos, out * sin, up));
-            mesh.uvs.push(glam::DVec2::new(radius, z));
-        }
-    }
-    for ring in 0..profile.len() as u32 - 1 {
-        for k in 0..SIDES {
-            let (a, b) = (ring * SIDES + k, ring * SIDES + (k + 1) % SIDES);
-            mesh.faces.extend([[a, a + SIDES, b + SIDES], [a, b + SIDES, b]]);
-        }
-    }
-    mesh
 }

@@ -1,5 +1,5 @@
 use demeter_frame::Rgb;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rand::Rng;
 
 use super::Seeded;
@@ -15,20 +15,45 @@ pub struct Sensor {
     pub white_balance: Vec3,
     /// Standard deviation of the lens blur, pixels; 0 for none.
     pub blur: f32,
+    /// How far the picture moves while it is taken, pixels right and down.
+    pub smear: Vec2,
+    /// How much darker its corners are than its middle, 0..=1.
+    pub vignette: f32,
+    /// Light scattered in the lens.
+    pub flare: Option<Flare>,
     /// Noise of a pixel at full brightness, linear (photon noise; falls with the root of brightness).
     pub shot_noise: f32,
     /// Noise in the dark, linear.
     pub read_noise: f32,
 }
 
+/// A lamp or the sun in or beside the picture, whose light the lens scatters over it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flare {
+    /// Where, in widths of the picture from its upper left corner.
+    pub at: Vec2,
+    /// Linear colour where it is strongest, times the picture's mean brightness.
+    pub colour: Vec3,
+    /// How far it reaches, widths of the picture.
+    pub reach: f32,
+}
+
 impl Sensor {
     /// A clean camera: no blur, no noise.
-    pub const CLEAN: Self =
-        Self { samples: 1, exposure: 0.22, white_balance: Vec3::ONE, blur: 0.0, shot_noise: 0.0, read_noise: 0.0 };
+    pub const CLEAN: Self = Self {
+        samples: 1,
+        exposure: 0.22,
+        white_balance: Vec3::ONE,
+        blur: 0.0,
+        smear: Vec2::ZERO,
+        vignette: 0.0,
+        flare: None,
+        shot_noise: 0.0,
+        read_noise: 0.0,
+    };
 
     /// A day-light camera with the faults that cameras have.
-    pub const FIELD: Self =
-        Self { samples: 1, exposure: 0.22, white_balance: Vec3::ONE, blur: 0.5, shot_noise: 0.015, read_noise: 0.003 };
+    pub const FIELD: Self = Self { blur: 0.5, shot_noise: 0.015, read_noise: 0.003, ..Self::CLEAN };
 
     /// Turns linear light, row-major, into 8-bit sRGB. A `light` of another size than `width * height` gives black.
     #[must_use]
@@ -36,6 +61,8 @@ impl Sensor {
         let mut light = light.to_vec();
         light.resize(width as usize * height as usize, Vec3::ZERO);
         blur(&mut light, width as usize, self.blur);
+        smear(&mut light, width as usize, self.smear);
+        self.scatter(&mut light, width as usize);
         // Highlights count at most fourfold, as in a camera's metering.
         let mean = light.iter().map(|c| c.element_sum().min(4.0) / 3.0).sum::<f32>() / light.len().max(1) as f32;
         let gain = self.white_balance * (self.exposure / mean.max(1e-4));
@@ -52,6 +79,42 @@ impl Sensor {
         }
         Rgb::from_raw(width, height, bytes).unwrap_or_default()
     }
+
+    /// Darkens the corners and adds the flare.
+    fn scatter(&self, light: &mut [Vec3], width: usize) {
+        if self.vignette <= 0.0 && self.flare.is_none() {
+            return;
+        }
+        let mean = light.iter().sum::<Vec3>() / light.len().max(1) as f32;
+        let shape = Vec2::new(1.0, (light.len() / width.max(1)) as f32 / width.max(1) as f32);
+        for (n, c) in light.iter_mut().enumerate() {
+            let at = Vec2::new((n % width) as f32, (n / width) as f32) / width as f32;
+            let off = (at - shape * 0.5).length_squared() / (0.25 * shape.length_squared());
+            *c *= 1.0 - self.vignette * off;
+            if let Some(flare) = self.flare {
+                *c += flare.colour * mean * (-(at - flare.at).length_squared() / (flare.reach * flare.reach)).exp();
+            }
+        }
+    }
+}
+
+/// Averages along the way that the picture moves.
+fn smear(light: &mut Vec<Vec3>, width: usize, way: Vec2) {
+    /// Longest way, pixels: more is no picture.
+    const LONGEST: f32 = 16.0;
+    let steps = way.length().min(LONGEST).round() as i32;
+    if steps < 1 || width == 0 {
+        return;
+    }
+    let height = light.len() / width;
+    let way = way.clamp_length_max(LONGEST);
+    let at = |x: usize, y: usize, k: i32| {
+        let moved = Vec2::new(x as f32, y as f32) + way * (k as f32 / steps as f32 - 0.5) + 0.5;
+        let (x, y) = ((moved.x.max(0.0) as usize).min(width - 1), (moved.y.max(0.0) as usize).min(height - 1));
+        light[y * width + x]
+    };
+    let mean = |n: usize| (0..=steps).map(|k| at(n % width, n / width, k)).sum::<Vec3>() / (steps + 1) as f32;
+    *light = (0..light.len()).map(mean).collect();
 }
 
 /// Nearly normal noise of standard deviation 1 out of one draw: four bytes summed.

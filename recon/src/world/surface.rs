@@ -1,6 +1,6 @@
 use glam::{Vec2, Vec3};
 
-use super::texture::{fractal, hash, noise, pebble, unit};
+use super::noise::{fractal, hash, noise, pebble, unit};
 
 /// What ground and walls look like; colours are linear reflectances, lengths metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,12 +26,14 @@ pub enum Surface {
         /// Size of the things.
         size: f32,
     },
-    /// A light wall with dark and grey uprights at both sides, as in imaging chambers.
+    /// The inside of an imaging chamber: a light panel in a dark frame between grey metal walls with seams.
     Chamber {
-        /// Colour of the middle.
+        /// Colour of the panel.
         colour: Vec3,
-        /// Where the uprights begin left and right of the middle.
+        /// Half the panel's width, metres.
         half_width: f32,
+        /// Height of the panel's lower edge, metres; below it is a bench.
+        bench: f32,
     },
 }
 
@@ -42,29 +44,64 @@ impl Surface {
             Self::Plain { colour } => colour * (0.96 + 0.08 * noise(p * 2.0, seed)),
             Self::Soil { colour, stones, straw, weeds } => soil(p, colour, [stones, straw, weeds], seed),
             Self::Clutter { size } => clutter(p / size, seed),
-            Self::Chamber { colour, half_width } => {
-                let beyond = p.x.abs() - half_width;
-                if beyond < 0.0 {
-                    return colour * (0.97 + 0.06 * noise(p * 1.5, seed));
-                }
-                let bar = hash(glam::IVec2::new((beyond / 0.06) as i32, i32::from(p.x < 0.0)), seed);
-                Vec3::splat(0.02 + 0.5 * unit(bar) * unit(bar)) * (0.8 + 0.4 * noise(p * 3.0, seed))
-            }
+            Self::Chamber { colour, half_width, bench } => chamber(p, colour, half_width, bench, seed),
         }
     }
+}
+
+fn chamber(p: Vec2, colour: Vec3, half_width: f32, bench: f32, seed: u32) -> Vec3 {
+    let part = |k: i32| unit(hash(glam::IVec2::new(k, 0), seed));
+    let metal = Vec3::new(0.95, 1.0, 0.94) * (0.1 + 0.6 * part(1)) * (0.85 + 0.3 * noise(p * 1.5, seed));
+    let beyond = p.x.abs() - half_width;
+    if p.y < bench {
+        // The bench's edge and a rail on it are dark.
+        let depth = bench - p.y;
+        let dark = depth < 0.012 || (depth - 0.1 - 0.1 * part(2)).abs() < 0.008;
+        return if dark { metal * 0.15 } else { colour * (0.4 + 0.4 * part(3)) };
+    }
+    if beyond < 0.0 {
+        // Dimmer towards the frame.
+        let edge = (1.0 + beyond / half_width.max(0.05)).max(0.0);
+        return colour * (1.0 - 0.25 * edge.powi(4)) * (0.97 + 0.06 * noise(p * 1.5, seed));
+    }
+    let frame = 0.03 + 0.09 * part(4);
+    if beyond < frame {
+        return Vec3::splat(0.01 + 0.05 * part(5)) * (0.8 + 0.4 * noise(p * 3.0, seed));
+    }
+    // Upright seams and profiles, and slanting cross rails because side walls run towards the camera.
+    let seam = ((beyond - frame) / (0.12 + 0.2 * part(6))).fract();
+    let rail = ((p.y + 0.25 * beyond * (part(7) - 0.3)) / (0.5 + part(8))).fract();
+    if rail < 0.03 {
+        return metal * 0.12;
+    }
+    metal
+        * if seam < 0.1 {
+            0.25
+        } else if seam < 0.2 {
+            1.25
+        } else {
+            0.9
+        }
 }
 
 fn soil(p: Vec2, colour: Vec3, [stones, straw, weeds]: [f32; 3], seed: u32) -> Vec3 {
     let crumbs = fractal(p * 40.0, 3, seed);
     let patches = noise(p * 3.0, seed ^ 1);
-    let mut c = colour * (0.35 + 1.0 * crumbs + 0.3 * patches);
+    // Clods are lighter on one side: their relief, lit from a direction of the seed's.
+    let aside = Vec2::from_angle(std::f32::consts::TAU * unit(seed)) * 0.008;
+    let relief = noise((p + aside) * 18.0, seed ^ 12) - noise((p - aside) * 18.0, seed ^ 12);
+    let rough = unit(seed.rotate_left(8));
+    let mut c = colour * (0.35 + crumbs + 0.3 * patches + 1.6 * rough * relief).max(0.12);
     if stones + weeds > 0.0 {
         // Warping makes stones and leaves of round pebbles.
         let warp = Vec2::new(noise(p * 55.0, seed ^ 11), crumbs) * 0.03;
-        let (inside, h) = pebble((p + warp) / 0.04, 1.0, stones, seed ^ 2);
-        if inside > 0.05 {
-            let grey = 0.12 + 0.4 * unit(h.rotate_left(9));
-            c = Vec3::new(1.0, 0.96, 0.9) * grey * (0.55 + 0.6 * inside.min(0.6) + 0.3 * crumbs);
+        for (size, layer) in [(0.016, 13), (0.04, 2)] {
+            let (inside, h) = pebble((p + warp * (size / 0.04)) / size, 1.0 + unit(seed ^ layer), stones, seed ^ layer);
+            if inside > 0.05 {
+                let grey = 0.12 + 0.45 * unit(h.rotate_left(9));
+                let lit = 0.8 + 1.2 * relief;
+                c = Vec3::new(1.0, 0.96, 0.9) * grey * lit * (0.55 + 0.6 * inside.min(0.6) + 0.3 * crumbs);
+            }
         }
         let (inside, h) = pebble((p + warp) / 0.09, 2.5, weeds, seed ^ 4);
         if inside > 0.45 {

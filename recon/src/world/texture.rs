@@ -1,57 +1,88 @@
-//! Procedural noise on integer lattices: the same on every machine.
+use glam::{Vec2, Vec3};
+use image::RgbaImage;
 
-use glam::{IVec2, Vec2};
-
-/// A well-mixed hash of a lattice point (the finaliser of MurmurHash3).
-pub(super) fn hash(at: IVec2, seed: u32) -> u32 {
-    let mut h =
-        seed ^ (at.x as u32).wrapping_mul(0x9E37_79B1) ^ (at.y as u32).wrapping_mul(0x85EB_CA77).rotate_left(13);
-    h = (h ^ (h >> 16)).wrapping_mul(0x85EB_CA6B);
-    h = (h ^ (h >> 13)).wrapping_mul(0xC2B2_AE35);
-    h ^ (h >> 16)
+/// The picture of a leaf: linear colours, and where there is leaf at all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    width: usize,
+    height: usize,
+    /// Row-major from the picture's upper left.
+    colours: Vec<Vec3>,
+    solid: Vec<bool>,
+    mean: Vec3,
+    solid_share: f32,
 }
 
-/// A hash as a number in 0..1.
-pub(super) fn unit(h: u32) -> f32 {
-    (h >> 8) as f32 / 16_777_216.0
-}
-
-/// Smooth value noise in 0..1 with features of size 1.
-pub(super) fn noise(p: Vec2, seed: u32) -> f32 {
-    let cell = p.floor();
-    let t = p - cell;
-    let t = t * t * (3.0 - 2.0 * t);
-    let at = cell.as_ivec2();
-    let value = |x, y| unit(hash(at.wrapping_add(IVec2::new(x, y)), seed));
-    let low = value(0, 0) + (value(1, 0) - value(0, 0)) * t.x;
-    let high = value(0, 1) + (value(1, 1) - value(0, 1)) * t.x;
-    low + (high - low) * t.y
-}
-
-/// Value noise summed over octaves, in 0..1.
-pub(super) fn fractal(p: Vec2, octaves: u32, seed: u32) -> f32 {
-    let (mut sum, mut weight, mut total, mut p) = (0.0, 0.5, 0.0, p);
-    for octave in 0..octaves {
-        sum += weight * noise(p, seed.wrapping_add(octave));
-        total += weight;
-        weight *= 0.5;
-        p *= 2.1;
+impl Texture {
+    /// A texture of an sRGB picture; there is leaf where alpha is at least one half. `None` when that is nowhere.
+    #[must_use]
+    pub fn new(picture: &RgbaImage) -> Option<Self> {
+        let decode: Vec<f32> = (0..=255u8).map(linear).collect();
+        let colours: Vec<Vec3> = picture
+            .pixels()
+            .map(|p| Vec3::from_array([p.0[0], p.0[1], p.0[2]].map(|c| decode[usize::from(c)])))
+            .collect();
+        let solid: Vec<bool> = picture.pixels().map(|p| p.0[3] >= 128).collect();
+        let count = solid.iter().filter(|s| **s).count();
+        let sum: Vec3 = colours.iter().zip(&solid).filter(|(_, solid)| **solid).map(|(colour, _)| *colour).sum();
+        (count > 0).then(|| Self {
+            width: picture.width() as usize,
+            height: picture.height() as usize,
+            mean: sum / count as f32,
+            solid_share: count as f32 / solid.len() as f32,
+            colours,
+            solid,
+        })
     }
-    sum / total
+
+    /// Share of the picture that is leaf, 0..=1.
+    #[must_use]
+    pub fn solid_share(&self) -> f32 {
+        self.solid_share
+    }
+
+    /// Mean linear colour of the leaf.
+    pub(super) fn mean(&self) -> Vec3 {
+        self.mean
+    }
+
+    /// Whether there is leaf at `uv`; outside 0..=1 the border goes on.
+    pub(super) fn is_solid(&self, uv: Vec2) -> bool {
+        self.solid[self.texel(uv)]
+    }
+
+    /// Linear colour at `uv`.
+    pub(super) fn colour(&self, uv: Vec2) -> Vec3 {
+        self.colours[self.texel(uv)]
+    }
+
+    fn texel(&self, uv: Vec2) -> usize {
+        // Casts saturate, and NaN becomes 0.
+        let x = ((uv.x * self.width as f32) as usize).min(self.width - 1);
+        let y = ((uv.y * self.height as f32) as usize).min(self.height - 1);
+        y * self.width + x
+    }
 }
 
-/// One pebble in each cell of size 1: how far inside it `p` lies (0 outside .. 1 at its middle) and its number.
-/// `stretch` > 1 makes it a straw in a random direction; `share` of the cells hold one.
-pub(super) fn pebble(p: Vec2, stretch: f32, share: f32, seed: u32) -> (f32, u32) {
-    let cell = p.floor();
-    let h = hash(cell.as_ivec2(), seed);
-    if unit(h) >= share {
-        return (0.0, h);
+/// sRGB's decoding (IEC 61966-2-1).
+fn linear(code: u8) -> f32 {
+    let x = f32::from(code) / 255.0;
+    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transparent_texels_are_no_leaf_and_count_in_no_mean() {
+        let mut picture = RgbaImage::from_pixel(4, 2, image::Rgba([255, 255, 255, 0]));
+        assert_eq!(Texture::new(&picture), None);
+        picture.put_pixel(3, 1, image::Rgba([0, 188, 0, 255]));
+        let texture = Texture::new(&picture).expect("one texel of leaf");
+        assert_eq!(texture.solid_share(), 0.125);
+        assert!((texture.mean().y - 0.5).abs() < 0.01, "sRGB 188 is about one half");
+        assert!(texture.is_solid(Vec2::new(0.9, 0.9)) && texture.is_solid(Vec2::splat(7.0)));
+        assert!(!texture.is_solid(Vec2::new(0.9, 0.1)) && !texture.is_solid(Vec2::splat(f32::NAN)));
     }
-    let random = |k: u32| unit(hash(IVec2::new(h as i32, k as i32), seed));
-    let radius = 0.12 + 0.3 * random(1) * random(1);
-    let middle = Vec2::new(0.5, 0.5) + (Vec2::new(random(2), random(3)) - 0.5) * (1.0 - 2.0 * radius);
-    let at = Vec2::from_angle(random(4) * std::f32::consts::TAU).rotate(p - cell - middle);
-    let distance = Vec2::new(at.x, at.y * stretch).length() / radius;
-    ((1.0 - distance).max(0.0), h)
 }

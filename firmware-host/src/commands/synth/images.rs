@@ -8,8 +8,9 @@ use demeter_recon::world::{View, boundary_distance, training_view};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::{CommandError, Exit};
-use crate::files;
 use crate::output::Output;
+
+use super::assets;
 
 /// Arguments of `demeter synth images`.
 #[derive(Debug, clap::Args)]
@@ -26,6 +27,9 @@ pub(super) struct Args {
     /// Threads; the files do not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     threads: u32,
+    /// A folder of tools/helios/meshes.py, whose plants and leaf pictures join those of our own species.
+    #[arg(long, value_name = "FOLDER")]
+    assets: Option<PathBuf>,
     /// The folder: meta.json, rgb.u8 [n,h,w,3], sem.u8, dist.u8, depth.u16 [n,h,w], camera.f32 [n,3] (horizontal field of
     /// view, pitch, roll, radians), little-endian.
     #[arg(short, long)]
@@ -45,8 +49,7 @@ struct Sheet {
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
-    // Not the learned ones: what the networks are trained on must not change with every lesson.
-    let (soybean, maize) = (files::species("generic:soybean")?, files::species("generic:maize")?);
+    let nursery = assets::nursery(args.assets.as_deref())?;
     let failed = |error: std::io::Error| {
         CommandError::failed("output", &std::io::Error::other(format!("{}: {error}", args.output.display())))
     };
@@ -57,12 +60,12 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         // Thread k makes pictures k, k + threads, ..; reading the channels in turn restores the order.
         let make = |k: u32| {
             let (send, receive) = sync_channel(4);
-            let (soybean, maize) = (&soybean, &maize);
+            let nursery = &nursery;
             scope.spawn(move || {
                 for i in (k..args.count).step_by(args.threads as usize) {
                     // Seeds of one set never meet those of another with a nearby seed.
                     let seed = args.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(u64::from(i));
-                    let made = training_view(soybean, maize, args.size, seed).map(|shot| Sheet::of(&shot));
+                    let made = training_view(nursery, args.size, seed).map(|shot| Sheet::of(&shot));
                     if send.send(made).is_err() {
                         return;
                     }
