@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::Surface;
-use super::noise::noise;
+use super::noise::{fractal, noise};
 use super::scene::Scene;
 
 /// What is seen above and behind the ground.
@@ -45,9 +45,17 @@ pub(super) fn background(scene: &Scene, eye: Vec3, ray: Vec3) -> Background {
         Backdrop::Wall { distance, .. } => (distance as f32 - eye.y) / ray.y,
     };
     let wall = if wall > 0.0 { wall } else { f32::INFINITY };
+    let outdoors = matches!(scene.setting.backdrop, Backdrop::Sky { .. });
     if ground <= wall && ground < 200.0 {
         let p = eye + ray * ground;
-        let colour = scene.setting.ground.surface.colour(Vec2::new(p.x, p.y), scene.seed);
+        let mut colour = scene.setting.ground.surface.colour(Vec2::new(p.x, p.y), scene.seed);
+        if outdoors {
+            // Beyond the field lie others.
+            let far = ((ground - 15.0) / 40.0).clamp(0.0, 0.9);
+            let other =
+                Vec3::new(0.16, 0.17, 0.09).lerp(Vec3::new(0.08, 0.16, 0.04), noise(Vec2::splat(0.5), scene.seed));
+            colour = colour.lerp(other, far);
+        }
         let sun = scene.shadow.sunlight(p, light.to_sun) * light.to_sun.z.max(0.0);
         return Background { colour: colour * (light.ambient + light.sun * sun), distance: ground };
     }
@@ -68,6 +76,13 @@ fn sky(scene: &Scene, ray: Vec3) -> Background {
         Backdrop::Wall { .. } => 1.0,
     };
     let up = ray.normalize().z.max(0.0);
+    // A line of trees and hedges on the horizon.
+    let azimuth = ray.y.atan2(ray.x);
+    let trees = fractal(Vec2::new(azimuth * 25.0, 0.5), 3, scene.seed ^ 8) * 0.12 - 0.04;
+    if up < trees {
+        let leaves = fractal(Vec2::new(azimuth, up) * 90.0, 2, scene.seed ^ 9);
+        return Background { colour: Vec3::new(0.05, 0.08, 0.04) * (0.5 + leaves), distance: f32::INFINITY };
+    }
     let clouds = noise(Vec2::new(ray.x, ray.y) * 3.0 / (ray.z.abs() + 0.3), scene.seed ^ 6);
     let colour = Vec3::new(0.75, 0.82, 0.9).lerp(Vec3::new(0.32, 0.5, 0.85), up * (1.0 - 0.7 * clouds));
     Background { colour: colour * brightness, distance: f32::INFINITY }

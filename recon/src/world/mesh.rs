@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use demeter_frame::{Pose, Semantic};
@@ -145,6 +146,50 @@ impl LabelledMesh {
         self.positions.iter().map(|p| p.z).fold(0.0, f32::max)
     }
 
+    /// The same plant with fewer faces, for seeing from afar. Of each blade the vertices in one cube of a third of its
+    /// length become the one farthest from the blade's middle, so that it keeps its outline; petioles, thinner than a
+    /// pixel there, collapse and go; the main stem stays.
+    #[must_use]
+    pub(super) fn coarsened(&self) -> Self {
+        let mut coarse = self.clone();
+        let mut becomes: Vec<u32> = (0..self.positions.len() as u32).collect();
+        for (organ, own) in self.organs.iter().zip(self.vertices_of_organs()) {
+            if organ.semantic == Semantic::MainStem || own.is_empty() {
+                continue;
+            }
+            let at = |v: u32| self.positions[v as usize];
+            let middle = own.iter().map(|v| at(*v)).sum::<Vec3>() / own.len() as f32;
+            let reach = own.iter().map(|v| at(*v).distance(middle)).fold(0.0, f32::max);
+            let cube = |v: u32| (at(v) / (0.67 * reach).max(1e-6)).floor().as_ivec3().to_array();
+            let mut farthest: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+            for v in &own {
+                let kept = farthest.entry(cube(*v)).or_insert(*v);
+                if at(*v).distance(middle) > at(*kept).distance(middle) {
+                    *kept = *v;
+                }
+            }
+            for v in own {
+                becomes[v as usize] = farthest[&cube(v)];
+            }
+        }
+        let faces = self.faces.iter().map(|face| face.map(|v| becomes[v as usize])).zip(&self.organ_of_face);
+        let whole = faces.filter(|([a, b, c], _)| a != b && b != c && c != a);
+        (coarse.faces, coarse.organ_of_face) = whole.unzip();
+        coarse
+    }
+
+    /// The plant without its blades: a leafless stalk.
+    #[must_use]
+    pub(super) fn leafless(&self) -> Self {
+        let stem = |face: &usize| self.organs[self.organ_of_face[*face] as usize].semantic != Semantic::Leaf;
+        let kept: Vec<usize> = (0..self.faces.len()).filter(stem).collect();
+        Self {
+            faces: kept.iter().map(|face| self.faces[*face]).collect(),
+            organ_of_face: kept.iter().map(|face| self.organ_of_face[*face]).collect(),
+            ..self.clone()
+        }
+    }
+
     /// The vertices of each organ, by the faces that name them.
     pub(super) fn vertices_of_organs(&self) -> Vec<Vec<u32>> {
         let mut vertices = vec![Vec::new(); self.organs.len()];
@@ -183,4 +228,86 @@ fn tensor<T, const N: usize>(
 
 fn wrong(tensor: &'static str, expected: impl ToString, found: impl ToString) -> MeshError {
     MeshError::Tensor { tensor, expected: expected.to_string(), found: found.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use safetensors::tensor::TensorView;
+
+    /// Two triangles: a stem without and a leaf with a texture.
+    fn bytes(corner: u32, organ: u16, kind: u8, texture: i16, x: f32) -> Vec<u8> {
+        let floats = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        let positions = floats(&[x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+        let normals = floats(&[0.0, 1.0, 0.0].repeat(3));
+        let uvs = floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+        let faces: Vec<u8> = [0, 1, 2, 2, 1, corner].iter().flat_map(|v: &u32| v.to_le_bytes()).collect();
+        let organs: Vec<u8> = [0, organ].iter().flat_map(|v: &u16| v.to_le_bytes()).collect();
+        let kinds = [3, kind];
+        let textures: Vec<u8> = [-1, texture].iter().flat_map(|v: &i16| v.to_le_bytes()).collect();
+        let view = |dtype, shape: &[usize], data| TensorView::new(dtype, shape.to_vec(), data).expect("fits");
+        let tensors = [
+            ("positions", view(Dtype::F32, &[3, 3], &positions)),
+            ("normals", view(Dtype::F32, &[3, 3], &normals)),
+            ("uvs", view(Dtype::F32, &[3, 2], &uvs)),
+            ("faces", view(Dtype::U32, &[2, 3], &faces)),
+            ("organ", view(Dtype::U16, &[2], &organs)),
+            ("kind", view(Dtype::U8, &[2], &kinds)),
+            ("texture", view(Dtype::I16, &[2], &textures)),
+        ];
+        let metadata = [("textures".to_owned(), "leaf.png".to_owned())].into();
+        safetensors::serialize(tensors, Some(metadata)).expect("fits")
+    }
+
+    fn read(bytes: &[u8]) -> Result<LabelledMesh, MeshError> {
+        let leaf = Texture::new(&image::RgbaImage::from_pixel(1, 1, image::Rgba([0, 99, 0, 255])));
+        LabelledMesh::from_bytes(bytes, |name| leaf.clone().map(Arc::new).filter(|_| name == "leaf.png"))
+    }
+
+    #[test]
+    fn what_was_written_is_read_and_whatever_is_wrong_is_named() {
+        let mesh = read(&bytes(0, 1, 1, 0, 0.5)).expect("valid");
+        assert_eq!(mesh.positions[0], Vec3::new(0.5, 0.0, 0.0));
+        assert_eq!((mesh.faces.len(), &mesh.organ_of_face[..], mesh.height()), (2, &[0, 1][..], 1.0));
+        assert_eq!(mesh.organs.iter().map(|o| o.semantic).collect::<Vec<_>>(), [Semantic::MainStem, Semantic::Leaf]);
+        assert!(mesh.organs[0].texture.is_none() && mesh.organs[1].texture.is_some());
+        for (tensor, wrong) in [
+            ("faces", bytes(3, 1, 1, 0, 0.0)),
+            ("organ", bytes(0, 2, 1, 0, 0.0)),
+            ("kind", bytes(0, 1, 0, 0, 0.0)),
+            ("kind", bytes(0, 1, 4, 0, 0.0)),
+            ("texture", bytes(0, 1, 1, 1, 0.0)),
+            ("positions", bytes(0, 1, 1, 0, f32::NAN)),
+        ] {
+            let error = read(&wrong).expect_err(tensor).to_string();
+            assert!(error.starts_with(tensor), "{error}");
+        }
+        assert!(LabelledMesh::from_bytes(&bytes(0, 1, 1, 0, 0.0), |_| None).is_err(), "a texture that is not at hand");
+        let whole = bytes(0, 1, 1, 0, 0.0);
+        assert!((0..whole.len()).all(|end| read(&whole[..end]).is_err()));
+    }
+
+    #[test]
+    fn far_plants_keep_their_blades_area_and_lose_faces_and_stalks_lose_blades() {
+        let species = crate::species::shipped("soybean").expect("listed").expect("valid");
+        let plant = crate::world::grow(&species, 0.5, &mut crate::world::seeded(3));
+        let mesh = LabelledMesh::of(&plant, &species, Detail::Rows).expect("valid");
+        let far = mesh.coarsened();
+        assert_eq!(far.organs, mesh.organs);
+        assert!(far.faces.len() * 4 < mesh.faces.len(), "{} of {}", far.faces.len(), mesh.faces.len());
+        let area = |mesh: &LabelledMesh, of: Semantic| -> f32 {
+            let faces = mesh.faces.iter().zip(&mesh.organ_of_face);
+            let own = faces.filter(|(_, organ)| mesh.organs[**organ as usize].semantic == of);
+            own.map(|(f, _)| {
+                let [a, b, c] = f.map(|v| mesh.positions[v as usize]);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .sum()
+        };
+        let kept = area(&far, Semantic::Leaf) / area(&mesh, Semantic::Leaf);
+        assert!((0.7..1.1).contains(&kept), "of the leaves' area {kept} is left");
+        assert_eq!(area(&far, Semantic::MainStem), area(&mesh, Semantic::MainStem));
+        let stalk = mesh.leafless();
+        assert_eq!((area(&stalk, Semantic::Leaf), area(&stalk, Semantic::Stem)), (0.0, area(&mesh, Semantic::Stem)));
+    }
 }

@@ -7,6 +7,9 @@ use super::ripple::ripple;
 use super::{LabelledMesh, Seeded, Texture, WorldError, grow};
 use crate::model::{Detail, Habit, Species};
 
+/// Kinds whose leaves all leave at the ground.
+const ROSETTES: [&str; 3] = ["sugarbeet", "strawberry", "butterlettuce"];
+
 /// The plants and leaf pictures that training pictures are made of.
 ///
 /// With species alone, blades are drawn. [`Self::add_mesh`] brings plants of another generator, [`Self::add_blade`] the
@@ -30,6 +33,8 @@ struct Sapling {
 /// Plants of one kind and about one age: how a bed of them is sown.
 pub(super) struct Bed {
     pub plants: Vec<Arc<LabelledMesh>>,
+    /// The same with few faces, for those that are far away.
+    pub far: Vec<Arc<LabelledMesh>>,
     /// Height of the highest, metres.
     pub height: f32,
 }
@@ -55,9 +60,13 @@ impl Nursery {
         Self { species, ..Self::default() }
     }
 
-    /// Adds a plant of a kind, `maize` say; `grass` tells strap leaves from broad ones.
+    /// Adds a plant of a kind, `maize` say; `grass` tells strap leaves from broad ones. Plants of one leaf are left out.
     pub fn add_mesh(&mut self, kind: &str, grass: bool, mesh: LabelledMesh) {
         let height = mesh.height();
+        // A seedling of one leaf is a stick with a flag: no picture of it teaches a plant's shape.
+        if mesh.organs.iter().filter(|organ| organ.semantic == Semantic::Leaf).count() < 2 {
+            return;
+        }
         self.meshes.push(Sapling { kind: kind.to_owned(), grass, mesh: Arc::new(mesh), height });
     }
 
@@ -77,7 +86,14 @@ impl Nursery {
             sown(&meshes, count, rng)
         };
         let height = plants.iter().map(|mesh| mesh.height()).fold(0.0, f32::max);
-        Ok(Bed { plants, height })
+        let far = |mesh: &Arc<LabelledMesh>| Arc::new(mesh.coarsened());
+        Ok(Bed { far: plants.iter().map(far).collect(), plants, height })
+    }
+
+    /// A rosette of leaves and its height in metres, where the meshes have one.
+    pub(super) fn rosette(&self, rng: &mut Seeded) -> Option<(Arc<LabelledMesh>, f32)> {
+        let rosettes: Vec<&Sapling> = self.meshes.iter().filter(|s| ROSETTES.contains(&s.kind.as_str())).collect();
+        pick(&rosettes, rng).map(|s| (Arc::clone(&s.mesh), s.height))
     }
 
     fn grown(

@@ -17,15 +17,22 @@ use super::{Backdrop, Ground, Nursery, Scene, Seeded, Setting, Shade, StandingMe
 const TRIANGLES: usize = 300_000;
 /// Plants farther away are specks.
 const FARTHEST: f64 = 14.0;
+/// From here on plants are drawn with few faces: a leaf is then some pixels long.
+const FAR: f64 = 2.5;
 
 /// Rows on a field from the height of a robot's mast, looking along them or across, weeds between.
 pub(super) fn rows(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Shot, WorldError> {
     let wanted = if rng.random_bool(0.7) { Wanted::Broad } else { Wanted::Grass };
     let bed = nursery.bed(wanted, 4, rng)?;
     let weeds = nursery.bed(Wanted::Any, 4, rng)?;
-    let intrinsics = Intrinsics::from_hfov(size, size, rng.random_range(45f64..85.0).to_radians());
+    let intrinsics = Intrinsics::from_hfov(size, size, rng.random_range(40f64..100.0).to_radians());
     let height = rng.random_range(0.5..1.7);
-    let pitch: f64 = if rng.random_bool(0.85) { -rng.random_range(0.15..1.0) } else { -rng.random_range(1.0..1.5) };
+    // Mostly as robots look at rows, some along the horizon and some straight down.
+    let pitch: f64 = match rng.random_range(0..20) {
+        0..12 => -rng.random_range(0.3..0.9),
+        12..17 => -rng.random_range(0.0..0.3),
+        _ => -rng.random_range(0.9..1.5),
+    };
     let yaw = if rng.random_bool(0.7) { rng.random_range(-0.3..0.3) } else { rng.random_range(-PI..PI) };
     let eye = DVec3::new(rng.random_range(-0.4..0.4), 0.0, height);
     let ahead = direction(0.5 * PI + yaw, pitch).as_dvec3();
@@ -69,7 +76,7 @@ pub(super) fn rows(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Sho
     };
     spots.retain(|(at, ..)| at.distance(eye) < FARTHEST && seen(*at));
     spots.sort_by(|a, b| a.0.distance(eye).total_cmp(&b.0.distance(eye)));
-    let meshes = planted(&spots, &bed, &weeds, rng);
+    let meshes = planted(eye, &spots, &bed, &weeds, rng);
     let mut setting = field(rng);
     if rng.random_bool(0.2) {
         // The machine's own shadow, or that of whoever walks beside it.
@@ -83,14 +90,15 @@ pub(super) fn rows(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Sho
 
 /// Plants on the spots, the nearest first, as far as the triangles go. A spot is a place, whether it is the crop's, and a
 /// size.
-fn planted(spots: &[(DVec3, bool, f64)], crop: &Bed, weeds: &Bed, rng: &mut Seeded) -> Vec<StandingMesh> {
+fn planted(eye: DVec3, spots: &[(DVec3, bool, f64)], crop: &Bed, weeds: &Bed, rng: &mut Seeded) -> Vec<StandingMesh> {
     let (mut meshes, mut triangles, mut organs) = (Vec::new(), 0, 0);
     for (at, of_crop, scale) in spots {
         let bed = if *of_crop { crop } else { weeds };
         if bed.plants.is_empty() {
             continue;
         }
-        let mesh = &bed.plants[rng.random_range(0..bed.plants.len())];
+        let plants = if at.distance(eye) > FAR { &bed.far } else { &bed.plants };
+        let mesh = &plants[rng.random_range(0..plants.len())];
         triangles += mesh.faces.len();
         organs += mesh.organs.len();
         if triangles > TRIANGLES || organs > usize::from(u16::MAX) {
@@ -134,9 +142,10 @@ pub(super) fn close(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Sh
     }
     let mut setting = field(rng);
     let sheet = rng.random_range(0..10);
-    if sheet < 4 {
+    if sheet < 5 {
         let surface = match sheet {
-            0 => Surface::Plain { colour: Vec3::splat(rng.random_range(0.05f32..0.9)) },
+            0 | 1 => Surface::Plain { colour: Vec3::splat(rng.random_range(0.0f32..0.95).powi(2)) },
+            2 => Surface::Papers { size: height as f32 * rng.random_range(0.6f32..2.0) },
             _ => Surface::Clutter { size: height as f32 * rng.random_range(0.1f32..1.5) },
         };
         setting = Setting { ground: Ground { z: 0.0, surface }, light: daylight(rng), ..setting };
@@ -144,7 +153,8 @@ pub(super) fn close(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Sh
             setting.backdrop = Backdrop::Wall { distance: 4.0 * height + 3.0, surface };
         }
     }
-    let meshes = planted(&spots, &bed, &weeds, rng);
+    // As seen from where all are near.
+    let meshes = planted(DVec3::ZERO, &spots, &bed, &weeds, rng);
     let scene = Scene::of_meshes(&meshes, setting, rng.random())?;
     let above = match rng.random_range(0..10) {
         0..4 => rng.random_range(1.3..1.57),
@@ -155,4 +165,42 @@ pub(super) fn close(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Sh
     let fill = if in_row { rng.random_range(1.0..4.0) } else { rng.random_range(0.5..2.6) };
     let camera = aim(&scene, from, fill, size, rng);
     Ok(Shot { scene, camera, exposure: 0.22 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::species::shipped;
+    use crate::world::{Sensor, render, seeded};
+
+    #[test]
+    fn the_horizon_is_where_field_of_view_pitch_and_roll_say() {
+        let nursery = Nursery::new(vec![shipped("bean").expect("listed").expect("valid")]);
+        let (mut skies, mut grounds) = (0, 0);
+        for seed in 0..12 {
+            let shot = rows(&nursery, 48, &mut seeded(seed)).expect("valid");
+            let view = render(&shot.scene, &shot.camera, &Sensor::CLEAN, &mut seeded(seed));
+            // What camera.f32 keeps, and nothing else.
+            let (hfov, tilt) = (shot.camera.intrinsics.hfov(), shot.camera.tilt());
+            let focal = 24.0 / (0.5 * hfov).tan();
+            let (sin, cos) = tilt.pitch.sin_cos();
+            for (x, y, instance) in view.instances.enumerate_pixels() {
+                if instance.0[0] > 0 {
+                    continue;
+                }
+                let (right, down) = ((f64::from(x) + 0.5 - 24.0) / focal, (f64::from(y) + 0.5 - 24.0) / focal);
+                let upwards = right * tilt.roll.sin() - down * tilt.roll.cos();
+                let height = (upwards * cos + sin).atan2((1.0 + right * right + down * down).sqrt());
+                if view.depth.get_pixel(x, y).0[0] > 0.0 {
+                    grounds += 1;
+                    assert!(height < 0.0, "seed {seed}: ground at {x} {y}, {height} above the horizon");
+                } else {
+                    skies += 1;
+                    // The ground ends 200 m away, half a degree below the horizon of a mast of 1.7 m.
+                    assert!(height > -0.01, "seed {seed}: sky at {x} {y}, {height} below the horizon");
+                }
+            }
+        }
+        assert!(skies > 500 && grounds > 5000, "{skies} {grounds}");
+    }
 }

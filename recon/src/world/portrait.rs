@@ -21,7 +21,14 @@ pub(super) fn potted(nursery: &Nursery, wanted: Wanted, size: u32, rng: &mut See
         world_from_mesh: Pose::new(turn, DVec3::ZERO),
         scale: 1.0,
     };
-    let meshes: Vec<StandingMesh> = bed.plants.iter().take(1).map(standing).collect();
+    let mut meshes: Vec<StandingMesh> = bed.plants.iter().take(1).map(standing).collect();
+    let bolting = wanted == Wanted::Broad && rng.random_bool(0.15);
+    if let (true, Some((rosette, height)), Some(stalk)) = (bolting, nursery.rosette(rng), meshes.first_mut()) {
+        // A rosette with a leafless stalk, whose petioles pass for pods.
+        stalk.mesh = Arc::new(stalk.mesh.leafless());
+        let scale = bed.height * rng.random_range(0.08..0.3) / height.max(0.02);
+        meshes.push(StandingMesh { scale, ..standing(&rosette) });
+    }
     let radius = rng.random_range(0.05..0.16);
     let pot = Pot {
         radius,
@@ -42,19 +49,22 @@ pub(super) fn potted(nursery: &Nursery, wanted: Wanted, size: u32, rng: &mut See
             let colour = pale * rng.random_range(0.8..1.8);
             (Surface::Chamber { colour, half_width, bench }, rng.random_range(0.45..0.7))
         }
-        14..17 => (Surface::Plain { colour: pale * rng.random_range(0.05f32..0.6) }, 0.35),
+        14..16 => (Surface::Plain { colour: pale * rng.random_range(0.05f32..0.6) }, 0.35),
+        // Black cloth.
+        16..18 => (Surface::Plain { colour: Vec3::splat(rng.random_range(0.0f32..0.2).powi(2)) }, 0.06),
         _ => (Surface::Clutter { size: rng.random_range(0.05f32..0.6) }, 0.3),
     };
     // Crops of imaging chambers show no floor; a chamber's bench is on its wall.
     let hidden = matches!(surface, Surface::Chamber { .. }) || rng.random_bool(0.75);
-    let floor = if hidden { -4.0 } else { -pot.height - rng.random_range(0.0..0.4) };
+    let pot = rng.random_bool(0.8).then_some(pot);
+    let floor = if hidden { -4.0 } else { -pot.map_or(0.02, |pot| pot.height) - rng.random_range(0.0..0.4) };
     // Lamps behind the wall leave the plant dark, lamps in front do not.
     let lamp = rng.random_range(0.0f32..0.9);
     let ambient = rng.random_range(0.25f32..0.95).powi(2);
     let setting = Setting {
         ground: Ground { z: floor, surface: Surface::Plain { colour: Vec3::splat(rng.random_range(0.1..0.8)) } },
         backdrop: Backdrop::Wall { distance: 1.5, surface },
-        pot: Some(pot),
+        pot,
         light: Light {
             to_sun: direction(rng.random_range(0.0..TAU), rng.random_range(0.2..1.4)),
             sun: Vec3::new(1.0, 0.97, 0.9) * lamp,
@@ -63,7 +73,7 @@ pub(super) fn potted(nursery: &Nursery, wanted: Wanted, size: u32, rng: &mut See
         shade: None,
     };
     let scene = Scene::of_meshes(&meshes, setting, rng.random())?;
-    let above = if rng.random_bool(0.8) { rng.random_range(-0.05..0.2) } else { rng.random_range(0.2..0.9) };
+    let above = if rng.random_bool(0.8) { rng.random_range(-0.15..0.2) } else { rng.random_range(0.2..0.9) };
     let from = direction(-0.5 * PI + rng.random_range(-0.1..0.1), above).as_dvec3();
     let fill = match rng.random_range(0..20) {
         // Leaves leave the picture; the whole plant is small in it; it just fits.

@@ -142,8 +142,12 @@ mod tests {
     use super::*;
     use crate::model::{Detail, Form, Knots, PlantMesh, Species, forward};
     use crate::species::shipped;
-    use crate::world::{Nursery, Row, Setting, row, seeded, training_view};
+    use crate::world::{
+        LabelledMesh, Light, MeshOrgan, Nursery, Row, Setting, StandingMesh, Texture, row, seeded, training_view,
+    };
+    use demeter_frame::{Pose, Semantic};
     use glam::DVec3;
+    use std::sync::Arc;
 
     fn soybean() -> Species {
         shipped("soybean").expect("listed").expect("valid")
@@ -215,6 +219,47 @@ mod tests {
             }
         }
         assert!(inside > 1000 && visible * 2 > inside && behind * 200 < inside, "{inside} {visible} {behind}");
+    }
+
+    /// A horizontal leaf of 1 m x 1 m at a height of 1 m, of which the texture shows the half with smaller x.
+    fn half_leaf() -> Scene {
+        let picture = image::RgbaImage::from_fn(8, 8, |x, _| image::Rgba([20, 120, 20, if x < 4 { 255 } else { 0 }]));
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let mesh = LabelledMesh {
+            positions: corners.iter().map(|(x, y)| Vec3::new(x - 0.5, y - 0.5, 1.0)).collect(),
+            normals: vec![Vec3::Z; 4],
+            uvs: corners.iter().map(|(x, y)| Vec2::new(*x, *y)).collect(),
+            faces: vec![[0, 1, 2], [0, 2, 3]],
+            organ_of_face: vec![0, 0],
+            organs: vec![MeshOrgan { semantic: Semantic::Leaf, texture: Texture::new(&picture).map(Arc::new) }],
+        };
+        let standing = StandingMesh { mesh: Arc::new(mesh), world_from_mesh: Pose::IDENTITY, scale: 1.0 };
+        let light = Light { to_sun: Vec3::Z, ..Setting::STUDIO.light };
+        Scene::of_meshes(&[standing], Setting { light, ..Setting::STUDIO }, 1).expect("one organ")
+    }
+
+    #[test]
+    fn a_leaf_is_where_its_picture_is_and_so_is_its_shadow() {
+        let scene = half_leaf();
+        let look = |eye: DVec3, target| {
+            let world_from_camera = Pose::looking_at(eye, target, DVec3::Y);
+            let camera = Pinhole { intrinsics: Intrinsics::from_hfov(200, 200, 1.0), world_from_camera };
+            (camera, render(&scene, &camera, &Sensor::CLEAN, &mut seeded(1)))
+        };
+        let (camera, view) = look(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO);
+        // 2 m above the leaf.
+        let pixels_per_metre = camera.intrinsics.fx / 2.0;
+        let seen = view.instances.pixels().filter(|p| p.0[0] == 1).count() as f64;
+        assert!((seen / (0.5 * pixels_per_metre.powi(2)) - 1.0).abs() < 0.03, "{seen} pixels");
+        assert!(view.semantic.pixels().zip(view.instances.pixels()).all(|(s, i)| s.0[0] == u8::from(i.0[0] == 1)));
+        // From below the leaf, on the ground: dark under the half that is there, light under the other.
+        let (camera, view) = look(DVec3::new(0.0, -0.5, 0.9), DVec3::new(0.0, 0.1, 0.0));
+        let ground = |x: f64| {
+            let at = camera.world_from_camera.inverse().point(DVec3::new(x, 0.1, 0.0));
+            let at = camera.intrinsics.project(at).expect("ahead");
+            view.rgb.get_pixel(at.x as u32, at.y as u32).0[1]
+        };
+        assert!(ground(-0.25) < 150 && ground(0.25) > ground(-0.25) + 40, "{} {}", ground(-0.25), ground(0.25));
     }
 
     #[test]

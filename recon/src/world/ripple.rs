@@ -46,3 +46,36 @@ fn smooth(mesh: &mut LabelledMesh) {
         *normal = if fresh.dot(*normal) < 0.0 { -fresh } else { fresh };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Detail;
+    use crate::world::{grow, seeded};
+
+    #[test]
+    fn margins_wave_and_midribs_and_stems_stay() {
+        let species = crate::species::shipped("maize").expect("listed").expect("valid");
+        let plant = grow(&species, 0.5, &mut seeded(2));
+        let calm = LabelledMesh::of(&plant, &species, Detail::Rows).expect("valid");
+        let mut wavy = calm.clone();
+        ripple(&mut wavy, 0.3, &mut seeded(1));
+        let (mut moved, mut margins) = (0, 0);
+        for (organ, vertices) in calm.organs.iter().zip(calm.vertices_of_organs()) {
+            for v in vertices {
+                let v = v as usize;
+                let by = calm.positions[v].distance(wavy.positions[v]);
+                let margin = organ.semantic == Semantic::Leaf && [0.0, 1.0].contains(&calm.uvs[v].x);
+                if margin {
+                    margins += 1;
+                    moved += usize::from(by > 0.002);
+                }
+                assert!(by < 0.05, "{by} m");
+                assert!(margin || calm.uvs[v].x != 0.5 || by == 0.0, "the midrib moved by {by} m");
+                assert!(organ.semantic == Semantic::Leaf || by == 0.0, "a stem moved by {by} m");
+                assert!((wavy.normals[v].length() - 1.0).abs() < 1e-3);
+            }
+        }
+        assert!(moved * 2 > margins && margins > 100, "{moved} of {margins}");
+    }
+}

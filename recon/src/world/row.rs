@@ -73,7 +73,7 @@ pub(super) fn field(rng: &mut Seeded) -> Setting {
             z: 0.0,
             surface: Surface::Soil {
                 colour: brown * rng.random_range(0.5f32..1.8),
-                stones: rng.random_range(0.0f32..0.95).powi(2),
+                stones: rng.random_range(0.0f32..1.0).powf(1.5),
                 straw: rng.random_range(0.0f32..0.6).powi(2),
                 weeds: if rng.random_bool(0.3) { rng.random_range(0.0..0.2) } else { 0.0 },
             },

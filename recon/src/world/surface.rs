@@ -26,6 +26,11 @@ pub enum Surface {
         /// Size of the things.
         size: f32,
     },
+    /// Sheets of white paper and printed targets of black and white squares that lie over each other on a dark table.
+    Papers {
+        /// About half a sheet's length.
+        size: f32,
+    },
     /// The inside of an imaging chamber: a light panel in a dark frame between grey metal walls with seams.
     Chamber {
         /// Colour of the panel.
@@ -44,6 +49,7 @@ impl Surface {
             Self::Plain { colour } => colour * (0.96 + 0.08 * noise(p * 2.0, seed)),
             Self::Soil { colour, stones, straw, weeds } => soil(p, colour, [stones, straw, weeds], seed),
             Self::Clutter { size } => clutter(p / size, seed),
+            Self::Papers { size } => papers(p / size, seed),
             Self::Chamber { colour, half_width, bench } => chamber(p, colour, half_width, bench, seed),
         }
     }
@@ -84,19 +90,38 @@ fn chamber(p: Vec2, colour: Vec3, half_width: f32, bench: f32, seed: u32) -> Vec
         }
 }
 
+/// Six sheets; the first that covers `p` lies on top.
+fn papers(p: Vec2, seed: u32) -> Vec3 {
+    for sheet in 0..6 {
+        let part = |k: i32| unit(hash(glam::IVec2::new(sheet, k), seed ^ 31));
+        let middle = Vec2::new(part(0), part(1)) * 4.0 - 2.0;
+        let at = Vec2::from_angle(std::f32::consts::TAU * part(2)).rotate(p - middle);
+        if at.x.abs() > 1.0 || at.y.abs() > 0.7 {
+            continue;
+        }
+        let squares = (at / (0.05 + 0.25 * part(3))).floor().as_ivec2();
+        let printed = part(4) < 0.4 && at.x.abs() < 0.9 && at.y.abs() < 0.6;
+        let black = printed && hash(squares, seed ^ sheet as u32) & 1 == 0;
+        return Vec3::new(1.0, 0.99, 0.97) * if black { 0.03 } else { 0.6 + 0.3 * part(5) };
+    }
+    Vec3::new(0.12, 0.09, 0.07) * (0.4 + fractal(p * 8.0, 3, seed))
+}
+
 fn soil(p: Vec2, colour: Vec3, [stones, straw, weeds]: [f32; 3], seed: u32) -> Vec3 {
     let crumbs = fractal(p * 40.0, 3, seed);
     let patches = noise(p * 3.0, seed ^ 1);
     // Clods are lighter on one side: their relief, lit from a direction of the seed's.
     let aside = Vec2::from_angle(std::f32::consts::TAU * unit(seed)) * 0.008;
-    let relief = noise((p + aside) * 18.0, seed ^ 12) - noise((p - aside) * 18.0, seed ^ 12);
+    let clods = 8.0 + 20.0 * unit(seed.rotate_left(16));
+    let relief = noise((p + aside) * clods, seed ^ 12) - noise((p - aside) * clods, seed ^ 12);
     let rough = unit(seed.rotate_left(8));
-    let mut c = colour * (0.35 + crumbs + 0.3 * patches + 1.6 * rough * relief).max(0.12);
+    let mut c = colour * (0.35 + crumbs + 0.3 * patches + 3.0 * rough * relief).max(0.12);
     if stones + weeds > 0.0 {
         // Warping makes stones and leaves of round pebbles.
         let warp = Vec2::new(noise(p * 55.0, seed ^ 11), crumbs) * 0.03;
-        for (size, layer) in [(0.016, 13), (0.04, 2)] {
-            let (inside, h) = pebble((p + warp * (size / 0.04)) / size, 1.0 + unit(seed ^ layer), stones, seed ^ layer);
+        // Large ones are rarer.
+        for (size, layer, share) in [(0.016, 13, stones), (0.04, 2, stones), (0.09, 14, stones * stones)] {
+            let (inside, h) = pebble((p + warp * (size / 0.04)) / size, 1.0 + unit(seed ^ layer), share, seed ^ layer);
             if inside > 0.05 {
                 let grey = 0.12 + 0.45 * unit(h.rotate_left(9));
                 let lit = 0.8 + 1.2 * relief;

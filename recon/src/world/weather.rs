@@ -42,11 +42,12 @@ impl Shade {
 
 /// From a clear noon to an overcast day.
 pub(super) fn daylight(rng: &mut Seeded) -> Light {
-    let cloud: f32 = rng.random();
+    // Half of the days are clear.
+    let cloud: f32 = if rng.random_bool(0.5) { rng.random() } else { 0.3 * rng.random::<f32>() };
     let warm = Vec3::new(1.0, rng.random_range(0.85..0.97), rng.random_range(0.7..0.92));
     Light {
-        to_sun: direction(rng.random_range(0.0..TAU), rng.random_range(0.3..1.4)),
-        sun: warm * (2.6 * (1.0 - cloud * cloud)),
+        to_sun: direction(rng.random_range(0.0..TAU), rng.random_range(0.2..1.4)),
+        sun: warm * (3.2 * (1.0 - cloud * cloud)),
         ambient: Vec3::new(0.8, 0.9, 1.0) * (0.45 + 0.5 * cloud),
     }
 }
