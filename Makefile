@@ -38,7 +38,7 @@ evaluation: build
 # Every network of models/ from pictures of the synthetic world: an hour, and the same command resumes a stopped run.
 train: build
 	@tools/setup.sh training
-	test -d $(IMAGES) || { $(DEMETER) synth images --count 12000 --size 256 --seed 1 -o $(IMAGES).new && mv $(IMAGES).new $(IMAGES); }
+	test -d $(IMAGES) || tools/training-pictures.sh $(dir $(IMAGES)) 12000
 	nice -n 3 /usr/bin/python3 models/training/train_organ2d.py --data $(IMAGES) --minutes 55
 
 # Every species of recon/species from ../shared and generated plants: ten minutes, most of them growing the plants.

@@ -39,6 +39,24 @@ fn training_pictures_do_not_depend_on_threads_and_have_the_sizes_they_announce()
 }
 
 #[test]
+fn a_folder_of_assets_that_is_not_complete_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let (assets, pictures) = (folder.path().join("assets"), folder.path().join("pictures"));
+    let assets_argument = assets.to_str().unwrap();
+    let images = ["images", "--count", "1", "--size", "16", "--assets", assets_argument];
+    for name in ["plants", "textures", "blades"] {
+        std::fs::create_dir_all(assets.join(name)).unwrap();
+    }
+    assert_eq!(synth(&images, &pictures), Some(1), "no meta.json");
+    std::fs::write(assets.join("meta.json"), "{}").unwrap();
+    std::fs::write(assets.join("plants/maize_1.safetensors"), "no plant").unwrap();
+    assert_eq!(synth(&images, &pictures), Some(1), "no plant");
+    assert!(!pictures.exists());
+    std::fs::remove_file(assets.join("plants/maize_1.safetensors")).unwrap();
+    assert_eq!(synth(&images, &pictures), Some(0));
+}
+
+#[test]
 fn a_session_is_read_back_and_every_frame_passes_the_gate() {
     let folder = tempfile::tempdir().unwrap();
     let session = folder.path().join("row");

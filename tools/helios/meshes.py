@@ -13,11 +13,12 @@ FOLDER/blades/{broad,grass}_*.png: scans straightened, the base's row first, eac
 transparent where insects ate: what the blades of our own plants look like.
 
 Plant k of a species has seed SEED + k and an age drawn from that seed. A plant whose file is there already is not grown
-again, so a stopped run continues.
+again, so a stopped run continues; meta.json comes last.
 """
 
 import argparse
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -145,6 +146,11 @@ def main():
                 if not (args.output / "textures" / (Path(file).stem + ".png")).exists():
                     write_texture(args.output, file)
             print(path, len(plant.organ), flush=True)
+    made = {
+        "program": f"tools/helios/meshes.py, pyhelios3d {version('pyhelios3d')}", "seed": args.seed, "each": args.each,
+        "species": sorted(AGES), "leaflets": args.leaflets is not None,
+    }
+    (args.output / "meta.json").write_text(json.dumps(made) + "\n")
 
 
 if __name__ == "__main__":

@@ -43,6 +43,15 @@ pub(super) fn nursery(folder: Option<&Path>) -> Result<Nursery, CommandError> {
     Ok(nursery)
 }
 
+/// What the folder says of its making.
+///
+/// # Errors
+/// [`CommandError`] naming its meta.json when that is missing: then the folder is not complete.
+pub(super) fn made(folder: &Path) -> Result<serde_json::Value, CommandError> {
+    let path = folder.join("meta.json");
+    serde_json::from_slice(&files::read(&path)?).map_err(|error| CommandError::failed("assets", &error).of(&path))
+}
+
 /// The files of a folder in order of their names; those still being written are left out.
 fn listed(folder: &Path) -> Result<Vec<PathBuf>, CommandError> {
     let failed = |error: std::io::Error| CommandError::failed("file", &error).of(folder);

@@ -49,6 +49,7 @@ struct Sheet {
 }
 
 pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
+    let made = args.assets.as_deref().map(assets::made).transpose()?;
     let nursery = assets::nursery(args.assets.as_deref())?;
     let failed = |error: std::io::Error| {
         CommandError::failed("output", &std::io::Error::other(format!("{}: {error}", args.output.display())))
@@ -86,6 +87,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     })?;
     bar.finish();
     let meta = serde_json::json!({
+        "assets": made,
         "count": args.count, "height": args.size, "width": args.size, "seed": args.seed,
         "camera": "camera.f32 [n,3]: horizontal field of view; pitch, the optical axis above the horizon, negative when \
             the camera looks down; roll, by how much the world's up leans to the right of the picture's; radians",
