@@ -54,9 +54,10 @@ fn sensor(exposure: f32, detail: f32, size: u32, rng: &mut Seeded) -> Sensor {
     let pixels = detail * size as f32 / 256.0;
     let cast = if rng.random_bool(0.15) { 0.35 } else { 0.15 };
     let tint = |rng: &mut Seeded| rng.random_range(1.0 - cast..1.0 + cast);
-    let flare = rng.random_bool(0.06).then(|| Flare {
+    // Before a white wall any flare would leave no plant.
+    let flare = rng.random_bool(if exposure < 0.3 { 0.09 } else { 0.0 }).then(|| Flare {
         at: Vec2::new(rng.random_range(-0.2..1.2), rng.random_range(-0.3..0.5)),
-        colour: Vec3::new(tint(rng), tint(rng), tint(rng)) * rng.random_range(0.5f32..6.0),
+        colour: Vec3::new(tint(rng), tint(rng), tint(rng)) * rng.random_range(0.5f32..4.0),
         reach: rng.random_range(0.15..0.9),
     });
     Sensor {

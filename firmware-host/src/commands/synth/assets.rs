@@ -1,11 +1,13 @@
 //! What training pictures are made of, from a folder that tools/helios/meshes.py wrote.
 
 use std::collections::BTreeMap;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use demeter_recon::species::NAMES;
 use demeter_recon::world::{LabelledMesh, Nursery, Texture};
+use image::{ImageFormat, ImageReader};
 
 use crate::error::CommandError;
 use crate::files;
@@ -67,9 +69,9 @@ fn name_of(path: &Path) -> String {
 }
 
 fn texture(path: &Path) -> Result<Texture, CommandError> {
-    let picture = image::load_from_memory(&files::read(path)?)
+    let picture = ImageReader::with_format(Cursor::new(files::read(path)?), ImageFormat::Png)
+        .decode()
         .map_err(|error| CommandError::failed("texture", &error).of(path))?;
-    Texture::new(&picture.to_rgba8()).ok_or_else(|| {
-        CommandError::failed("texture", &std::io::Error::other("expected a leaf, found no solid pixel")).of(path)
-    })
+    let empty = || std::io::Error::other("expected a leaf, found no solid pixel");
+    Texture::new(&picture.to_rgba8()).ok_or_else(|| CommandError::failed("texture", &empty()).of(path))
 }
