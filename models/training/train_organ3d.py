@@ -2,6 +2,7 @@
 """Trains organ3d: see README.md beside this file."""
 
 import argparse
+import copy
 import os
 import pathlib
 import shlex
@@ -70,6 +71,14 @@ def losses(logits, found, sem, truth):
     return [semantic / BATCH, BOUNDARY_WEIGHT * (found[:, 0] - truth).abs().mean() / BATCH]
 
 
+def unweighted(network):
+    """The network with odds as they are: training with weighted classes multiplies them by the weights."""
+    network = copy.deepcopy(network)
+    with torch.no_grad():
+        network.head.bias[:CLASSES] -= CLASS_WEIGHTS.log()
+    return network
+
+
 def judge(network, folders, seed):
     """Figures on scans of what was held out."""
     confusion, error, asked = np.zeros((CLASSES, CLASSES)), 0.0, 0
@@ -118,16 +127,17 @@ def main():
         batches = torch.utils.data.DataLoader(samples, BATCH, collate_fn=list, num_workers=1, prefetch_factor=4)
         learn = lambda batch: (losses(*run.network(**inputs), sem, truth) for inputs, sem, truth in batch)
         run.train(batches, learn, args.minutes, 20 if args.smoke else 1 << 40, checkpoint)
+    network = unweighted(run.average)
     provenance = {
         "command": "models/training/" + shlex.join([pathlib.Path(sys.argv[0]).name, *sys.argv[1:]]),
         "seed": args.seed,
         "steps": run.earlier_steps + run.step,
         "program": f"train_organ3d.py, PyTorch {torch.__version__}, NumPy {np.__version__}, SciPy {scipy.__version__}",
         "data": [f.provenance() for f in folders],
-        "figures": {} if args.smoke else judge(run.average, folders, args.seed),
+        "figures": {} if args.smoke else judge(network, folders, args.seed),
     }
     print(provenance["figures"], flush=True)
-    export3d.write(run.average, args.out, args.version, provenance)
+    export3d.write(network, args.out, args.version, provenance)
     print(f"wrote {args.out / 'organ3d.onnx'}", flush=True)
 
 
