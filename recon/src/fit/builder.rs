@@ -103,7 +103,7 @@ impl<'a> Builder<'a> {
         self.add_leaf_at_end(petiolule, source)
     }
 
-    fn hanger(&self, parent: usize, source: Source<'a>) -> Result<&Hanger, FitError> {
+    fn hanger(&self, parent: usize, source: Source<'_>) -> Result<&Hanger, FitError> {
         let missing = PlantError::LeafParent { organ: source.organ, parent };
         Ok(self.hangers[parent].as_ref().ok_or(missing)?)
     }
@@ -156,6 +156,25 @@ impl<'a> Builder<'a> {
 
     fn add_leaf(&mut self, parent: usize, d: f64, joint: Similarity, source: Source<'a>) -> usize {
         let fit = leaf::fit(source.points, joint.translation, self.up, self.species);
+        self.add_fitted(parent, d, joint, source, fit)
+    }
+
+    /// Where an organ whose points are `points` hangs on a stem of the plant.
+    pub(super) fn joint(&self, parent: usize, source: Source<'_>) -> Result<(f64, Similarity), FitError> {
+        let hanger = self.hanger(parent, source)?;
+        let d = hanger.root(source.points);
+        Ok((d, hanger.joint(d)))
+    }
+
+    /// Adds a blade that was fitted where it hangs; gives its index.
+    pub(super) fn add_fitted(
+        &mut self,
+        parent: usize,
+        d: f64,
+        joint: Similarity,
+        source: Source<'a>,
+        fit: LeafFit,
+    ) -> usize {
         let organ = self.organs.len();
         self.hangers.push(None);
         self.evidence.push(Evidence { points: source.points, radius_known: false });

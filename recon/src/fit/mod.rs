@@ -14,6 +14,7 @@ pub(crate) mod leaflets;
 mod lone;
 mod loss;
 mod orient;
+mod pictured;
 pub(crate) mod solver;
 mod stem;
 mod tube;
@@ -26,6 +27,7 @@ pub use error::FitError;
 pub(crate) use error::{MIN_EXTENT, MIN_POINTS};
 use glam::{DQuat, DVec3};
 pub use lone::{LoneBlade, lone_blade};
+pub use pictured::{NODES, Pictured, pictured};
 
 use crate::cloud::thinned;
 use crate::model::{Plant, PlantError, Similarity, Species};

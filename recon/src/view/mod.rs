@@ -17,6 +17,7 @@ mod join;
 mod lift;
 mod overlay;
 mod scale;
+pub mod strap;
 mod track;
 
 use demeter_frame::{CameraError, Depth, Intrinsics, Mask, Pose};

@@ -13,7 +13,7 @@ mod seen;
 pub(super) mod sheet;
 pub(super) mod smeared;
 mod starts;
-mod state;
+pub(super) mod state;
 mod uncertainty;
 
 use glam::{DQuat, DVec3};
@@ -93,6 +93,18 @@ pub(super) fn alone(points: &[DVec3], up: DVec3, species: &Species) -> LeafFit {
         [one, other].map(|course| finish.trial(near(starts::along(&course, &few.points, up, species), &few, species)));
     let better = if other.misfit(&data) < one.misfit(&data) { other } else { one };
     finish.fit(better, ROUNDS - 1, up)
+}
+
+/// Starts of a blade along a known course, see [`starts::along`].
+pub(super) fn starts(course: &[DVec3], points: &[DVec3], up: DVec3, species: &Species) -> [State; 3] {
+    starts::along(course, points, up, species)
+}
+
+/// The fit that ended at `state`, of a blade whose points are `points`.
+pub(super) fn ended(state: State, points: &[DVec3], species: &Species) -> LeafFit {
+    let data = Data::thinned(points, FEW_POINTS);
+    let seen = Seen::of(state.sheet(species, COARSE), &data, None);
+    finished(state, &seen, &data, species)
 }
 
 /// A fit that ended at `state`, but for what the way there told.

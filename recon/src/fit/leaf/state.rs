@@ -10,7 +10,7 @@ use crate::model::leaf::{Blade, BladeJacobian, Lattice};
 
 /// A blade on its way to the data; angles as of the raw chain, before the gauge.
 #[derive(Clone, Debug)]
-pub(super) struct State {
+pub(in crate::fit) struct State {
     /// Where the main vein starts, metres.
     pub base: DVec3,
     /// world_from_chain.
@@ -25,19 +25,19 @@ pub(super) struct State {
 
 impl State {
     /// Index of the first of β, γ, ln s_x in a step: rotation (3) and ln length stand before them.
-    pub(super) const COEFFICIENTS: usize = 4;
+    pub(in crate::fit) const COEFFICIENTS: usize = 4;
 
-    pub(super) fn blade(&self) -> Blade {
+    pub(in crate::fit) fn blade(&self) -> Blade {
         Blade { beta: self.beta.clone(), gamma: self.gamma.clone(), width: self.log_width.exp() }
     }
 
     /// Length of the flat chord, metres.
-    pub(super) fn metres(&self) -> f64 {
+    pub(in crate::fit) fn metres(&self) -> f64 {
         self.log_length.exp()
     }
 
     /// A point of the raw chain in the world.
-    pub(super) fn place(&self, raw: DVec3) -> DVec3 {
+    pub(in crate::fit) fn place(&self, raw: DVec3) -> DVec3 {
         self.base + self.rotation * (raw * self.metres())
     }
 
@@ -55,7 +55,7 @@ impl State {
 
     /// The state after a step (rotation vector in the world, ln length, β, γ, ln s_x and, where the base may move, its
     /// shift), kept inside the model.
-    pub(super) fn stepped(&self, step: &DVector<f64>, species: &Species) -> Self {
+    pub(in crate::fit) fn stepped(&self, step: &DVector<f64>, species: &Species) -> Self {
         let ranges = &species.ranges;
         let vector = |at: usize| DVec3::new(step[at], step[at + 1], step[at + 2]);
         let moved = |c: &[f64], from: usize| clipped(c.iter().enumerate().map(|(k, c)| c + step[from + k]).collect());

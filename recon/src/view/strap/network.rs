@@ -1,0 +1,258 @@
+//! A silhouette's middle lines as a graph.
+
+use glam::DVec2;
+
+use super::silhouette::Silhouette;
+
+/// Side lines shorter than this many radii of the shape at their joint come of its raggedness (a guess: a blade's tip
+/// stands farther out).
+const SPUR: f64 = 1.6;
+/// Rounds of pruning; each takes one spur a joint.
+const ROUNDS: usize = 12;
+/// Parts of a silhouette that lie apart are one plant over gaps of at most this share of its diagonal: glare cuts blades
+/// (a guess).
+const GAP: f64 = 0.04;
+/// Most parts that are joined, the largest first; the rest are specks.
+const MAX_PARTS: usize = 32;
+/// A line's direction at a node is taken over this many radii, from outside the node's disc on.
+const BASELINE: f64 = 3.0;
+/// And at least over so many pixels.
+const MIN_BASELINE: f64 = 8.0;
+
+/// A line between two nodes.
+#[derive(Clone, Debug)]
+pub(super) struct Line {
+    /// Where it begins and ends.
+    pub nodes: [usize; 2],
+    /// Its pixels in that order.
+    pub pixels: Vec<usize>,
+    /// Pixels along it.
+    pub length: f64,
+}
+
+/// Middle lines and how they meet.
+#[derive(Clone, Debug)]
+pub(super) struct Network {
+    pub width: usize,
+    /// Half of the shape's width at each pixel of the picture.
+    pub radii: Vec<f32>,
+    pub lines: Vec<Line>,
+    /// Lines that begin or end at each node, with which of their ends.
+    pub nodes: Vec<Vec<(usize, usize)>>,
+    /// Pixel of each node.
+    pub at: Vec<usize>,
+}
+
+impl Network {
+    /// Of a silhouette: thinned, its parts joined, spurs pruned.
+    pub(super) fn of(shape: &Silhouette) -> Self {
+        let radii = shape.radii();
+        let mut thin = Thin::of(shape);
+        thin.join();
+        let mut network = thin.network(radii);
+        for _ in 0..ROUNDS {
+            let spurs = network.spurs();
+            if spurs.is_empty() {
+                break;
+            }
+            for spur in spurs {
+                let Line { nodes, pixels, .. } = &network.lines[spur];
+                let free = usize::from(network.nodes[nodes[0]].len() > 1);
+                let all_but_joint = if free == 1 { &pixels[1..] } else { &pixels[..pixels.len() - 1] };
+                all_but_joint.iter().for_each(|&p| thin.inside[p] = false);
+            }
+            network = thin.network(network.radii);
+        }
+        network.merged()
+    }
+
+    /// Place of a pixel's centre.
+    pub(super) fn place(&self, pixel: usize) -> DVec2 {
+        DVec2::new((pixel % self.width) as f64 + 0.5, (pixel / self.width) as f64 + 0.5)
+    }
+
+    /// Half of the shape's width at a pixel.
+    pub(super) fn radius(&self, pixel: usize) -> f64 {
+        f64::from(self.radii[pixel])
+    }
+
+    /// Direction in which a line leaves its node at `end` (0 or 1).
+    pub(super) fn leaving(&self, line: usize, end: usize) -> DVec2 {
+        let pixels = &self.lines[line].pixels;
+        let at = |k: usize| self.place(if end == 0 { pixels[k] } else { pixels[pixels.len() - 1 - k] });
+        let radius = self.radius(self.at[self.lines[line].nodes[end]]);
+        let span = (BASELINE * radius).max(MIN_BASELINE);
+        let last = pixels.len() - 1;
+        // Inside the node's disc the middle line bends to the node.
+        let from = (radius as usize).min(last / 2);
+        let to = (from + span as usize).min(last);
+        (at(to) - at(from)).normalize_or_zero()
+    }
+
+    /// Whether a node is the end of one line.
+    pub(super) fn is_tip(&self, node: usize) -> bool {
+        self.nodes[node].len() == 1
+    }
+
+    /// The shortest spur of every joint that has some.
+    fn spurs(&self) -> Vec<usize> {
+        let mut shortest: Vec<Option<usize>> = vec![None; self.nodes.len()];
+        for (k, line) in self.lines.iter().enumerate() {
+            let [a, b] = line.nodes;
+            let joint = match (self.is_tip(a), self.is_tip(b)) {
+                (true, false) => b,
+                (false, true) => a,
+                _ => continue,
+            };
+            let is_spur = line.length < SPUR * self.radius(self.at[joint]);
+            let is_shorter = shortest[joint].is_none_or(|other| line.length < self.lines[other].length);
+            if is_spur && is_shorter {
+                shortest[joint] = Some(k);
+            }
+        }
+        shortest.into_iter().flatten().collect()
+    }
+
+    /// The same with joints whose discs overlap made one: thinning draws crossings as two forks.
+    fn merged(mut self) -> Self {
+        let mut group: Vec<usize> = (0..self.nodes.len()).collect();
+        let is_short = |line: &Line| {
+            let radius = line.nodes.map(|n| self.radius(self.at[n])).into_iter().fold(0.0, f64::max);
+            line.nodes.iter().all(|&n| !self.is_tip(n)) && line.length <= radius
+        };
+        let short: Vec<bool> = self.lines.iter().map(is_short).collect();
+        for (line, _) in self.lines.iter().zip(&short).filter(|(_, short)| **short) {
+            let [a, b] = line.nodes.map(|n| group[n]);
+            group.iter_mut().filter(|g| **g == b).for_each(|g| *g = a);
+        }
+        let mut lines = Vec::new();
+        for (mut line, short) in self.lines.into_iter().zip(short) {
+            line.nodes = line.nodes.map(|n| group[n]);
+            if !(short && line.nodes[0] == line.nodes[1]) {
+                lines.push(line);
+            }
+        }
+        self.nodes = incidence(self.at.len(), &lines);
+        self.lines = lines;
+        self
+    }
+}
+
+fn incidence(count: usize, lines: &[Line]) -> Vec<Vec<(usize, usize)>> {
+    let mut nodes = vec![Vec::new(); count];
+    for (k, line) in lines.iter().enumerate() {
+        for end in 0..2 {
+            nodes[line.nodes[end]].push((k, end));
+        }
+    }
+    nodes
+}
+
+/// Pixels of middle lines.
+struct Thin {
+    shape: Silhouette,
+    inside: Vec<bool>,
+}
+
+impl Thin {
+    fn of(shape: &Silhouette) -> Self {
+        let inside = shape.thinned().inside().to_vec();
+        Self { shape: shape.clone(), inside }
+    }
+
+    /// Neighbours along the lines: no diagonal where two straight steps lead there.
+    fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> + use<> {
+        let ring = self.shape.ring(p);
+        let inside = ring.map(|q| self.inside[q]);
+        let is_step = move |k: usize| inside[k] && (k % 2 == 0 || !(inside[k - 1] || inside[(k + 1) % 8]));
+        (0..8).filter(move |&k| is_step(k)).map(move |k| ring[k])
+    }
+
+    /// Connected parts, largest first.
+    fn parts(&self) -> Vec<Vec<usize>> {
+        let mut seen = vec![false; self.inside.len()];
+        let mut parts = Vec::new();
+        for start in (0..seen.len()).filter(|&p| self.inside[p]) {
+            if std::mem::replace(&mut seen[start], true) {
+                continue;
+            }
+            let mut part = vec![start];
+            let mut next = 0;
+            while next < part.len() {
+                for q in self.shape.ring(part[next]).into_iter().filter(|&q| self.inside[q]) {
+                    if !std::mem::replace(&mut seen[q], true) {
+                        part.push(q);
+                    }
+                }
+                next += 1;
+            }
+            parts.push(part);
+        }
+        parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
+        parts
+    }
+
+    /// Draws straight lines over the gaps between parts of one plant; what lies farther off goes.
+    fn join(&mut self) {
+        let width = self.shape.width();
+        let place = |p: usize| ((p % width) as f64, (p / width) as f64);
+        let mut parts = self.parts().into_iter();
+        let Some(mut whole) = parts.next() else { return };
+        let diagonal = (width as f64).hypot(self.shape.height() as f64);
+        for (k, part) in parts.enumerate() {
+            let apart = |(a, b): &(usize, usize)| {
+                let ((ax, ay), (bx, by)) = (place(*a), place(*b));
+                (ax - bx).powi(2) + (ay - by).powi(2)
+            };
+            let pairs = part.iter().flat_map(|&a| whole.iter().map(move |&b| (a, b)));
+            let nearest = pairs.filter(|_| k < MAX_PARTS).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            match nearest.filter(|pair| apart(pair) <= (GAP * diagonal).powi(2)) {
+                Some((a, b)) => {
+                    let ((ax, ay), (bx, by)) = (place(a), place(b));
+                    let steps = (ax - bx).abs().max((ay - by).abs()).max(1.0);
+                    for k in 0..=steps as usize {
+                        let t = k as f64 / steps;
+                        let (x, y) = ((ax + (bx - ax) * t).round() as usize, (ay + (by - ay) * t).round() as usize);
+                        self.inside[y * width + x] = true;
+                    }
+                    whole.extend(part);
+                }
+                None => part.iter().for_each(|&p| self.inside[p] = false),
+            }
+        }
+    }
+
+    fn network(&self, radii: Vec<f32>) -> Network {
+        let width = self.shape.width();
+        let degree = |p: usize| self.neighbours(p).count();
+        let at: Vec<usize> = (0..self.inside.len()).filter(|&p| self.inside[p] && degree(p) != 2).collect();
+        let mut node_of = vec![usize::MAX; self.inside.len()];
+        at.iter().enumerate().for_each(|(k, &p)| node_of[p] = k);
+        let mut lines = Vec::new();
+        for &start in &at {
+            for first in self.neighbours(start) {
+                let mut pixels = vec![start, first];
+                while node_of[pixels[pixels.len() - 1]] == usize::MAX {
+                    let (before, here) = (pixels[pixels.len() - 2], pixels[pixels.len() - 1]);
+                    let Some(next) = self.neighbours(here).find(|&q| q != before) else { break };
+                    pixels.push(next);
+                }
+                let end = pixels[pixels.len() - 1];
+                // Each line is walked from both of its ends; one of the two walks is kept.
+                let forth = (start, first);
+                let back = (end, pixels[pixels.len() - 2]);
+                if forth <= back && node_of[end] != usize::MAX {
+                    let step = |pair: &[usize]| match pair[0].abs_diff(pair[1]) {
+                        1 => 1.0,
+                        across if across == width => 1.0,
+                        _ => std::f64::consts::SQRT_2,
+                    };
+                    let length = pixels.windows(2).map(step).sum();
+                    lines.push(Line { nodes: [node_of[start], node_of[end]], pixels, length });
+                }
+            }
+        }
+        let nodes = incidence(at.len(), &lines);
+        Network { width, radii, lines, nodes, at }
+    }
+}
