@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use demeter_frame::{Intrinsics, Pose, Rgb};
+use demeter_frame::{Intrinsics, Mask, Pose, Rgb};
 use demeter_models::{CameraGuess, ModelError, RuntimeError};
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::view::{self, DepthScale, Dropped, PlantView, Refused, ScaleError, View, ViewError};
@@ -135,6 +135,14 @@ impl Eye {
     /// [`SightError::Network`] when the network fails.
     pub fn camera(&mut self, picture: &Rgb) -> Result<CameraGuess, SightError> {
         self.networks.camera(picture)
+    }
+
+    /// The probability that each pixel shows a plant, at the network's size.
+    ///
+    /// # Errors
+    /// [`SightError::Network`] when the network fails.
+    pub fn plants(&mut self, picture: &Rgb) -> Result<Mask, SightError> {
+        Ok(self.networks.plants(picture)?)
     }
 
     /// Looks at a picture. With a place in the world the ground gives metres; without one the plants are put at 1 m.

@@ -19,6 +19,7 @@ mod networks;
 pub mod output;
 pub mod picture;
 pub mod pipeline;
+pub mod portrait;
 mod raster;
 pub mod reconstruct;
 pub mod report;

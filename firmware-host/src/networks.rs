@@ -103,6 +103,13 @@ impl Networks {
         Ok(self.ours.run(picture)?.camera)
     }
 
+    /// The probability, by ours, that each pixel shows a plant.
+    pub(crate) fn plants(&mut self, picture: &Rgb) -> Result<Mask, ModelError> {
+        let [mut plant, ..] = self.ours.run(picture)?.probabilities;
+        plant.iter_mut().for_each(|p| *p = 1.0 - *p);
+        Ok(plant)
+    }
+
     /// Looks at a picture. Ours must give an answer; what of the others fails is left out and said.
     pub(crate) fn look(&mut self, picture: &Rgb, camera: &Intrinsics) -> Result<Scene, SightError> {
         let maps = self.ours.run(picture)?;

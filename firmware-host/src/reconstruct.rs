@@ -2,7 +2,7 @@
 
 use demeter_recon::fit::{self, FitError, Fitted};
 use demeter_recon::model::{PlantError, Species};
-use demeter_recon::organs::OrganCloud;
+use demeter_recon::organs::{OrganCloud, OrganTree};
 use demeter_recon::tree::{self, TreeError};
 use glam::DVec3;
 
@@ -37,7 +37,7 @@ impl ReconstructError {
     }
 }
 
-/// Joins a view's organs to a tree, without the stems that carry nothing, and fits it; gives the points too. `up` is
+/// Joins a view's organs to a tree, without the stems that carry nothing, and fits it; gives the tree too. `up` is
 /// the vertical of their frame.
 ///
 /// # Errors
@@ -46,8 +46,8 @@ pub fn fit_organs(
     organs: Vec<OrganCloud>,
     species: &Species,
     up: DVec3,
-) -> Result<(Fitted, Vec<DVec3>), ReconstructError> {
+) -> Result<(Fitted, OrganTree), ReconstructError> {
     let tree = tree::without_bare_stems(tree::build(organs)?);
     let fitted = fit::plant(&tree, species, up)?;
-    Ok((fitted, tree.organs.into_iter().flat_map(|organ| organ.points).collect()))
+    Ok((fitted, tree))
 }

@@ -6,20 +6,18 @@ use std::time::Instant;
 
 use demeter_capture::decode_photo;
 use demeter_frame::{Intrinsics, Pose, Rgb};
-use demeter_recon::model::{Plant, Species};
-use demeter_recon::organs::ScaleSource;
-use glam::DVec3;
+use demeter_recon::model::Species;
 
-use crate::config::Config;
-use crate::describe::{Described, Encoding, describe};
+use crate::config::{Config, ModelsConfig};
 use crate::error::{CommandError, Exit, chain};
-use crate::eye::{Eye, PlantSight, SightError};
+use crate::eye::{Eye, SightError};
 use crate::files;
 use crate::lens::{self, Lens};
 use crate::output::Output;
 use crate::picture::{draw_over, png};
-use crate::reconstruct::{ReconstructError, fit_organs};
-use crate::report::{Camera, Document};
+use crate::portrait::{self, Portrait, PortraitError};
+use crate::reconstruct::ReconstructError;
+use crate::report::Document;
 
 /// Most plants reported of one photo, the largest first: fields of hundreds of specks end somewhere.
 const MAX_PLANTS: usize = 64;
@@ -55,12 +53,6 @@ pub struct Args {
     overlay: Option<PathBuf>,
 }
 
-/// A plant fitted in the camera's frame.
-struct Fitted {
-    described: Described,
-    in_camera: Plant,
-}
-
 /// Reconstructs the largest plant of a photo, or all of them.
 ///
 /// # Errors
@@ -81,8 +73,33 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         None => lens::guessed(&photo, &eye.camera(&photo).map_err(blind)?),
     };
     let mut warnings: Vec<String> = warning.into_iter().collect();
-    let sight = eye.look(&photo, &camera, None).map_err(blind)?;
-    warnings.extend(eye.degraded().iter().chain(&sight.degraded).map(ToString::to_string));
+    warnings.extend(eye.degraded().iter().map(ToString::to_string));
+    // Who brings networks of their own wants to see what those find.
+    let as_silhouette = !args.all && config.models == ModelsConfig::default();
+    let one = if as_silhouette { portrait::grass(&mut eye, &photo, &camera, &species) } else { Ok(None) };
+    let (mut fitted, failures) = match one {
+        Ok(Some(portrait)) => (vec![portrait], 0),
+        Ok(None) | Err(PortraitError::Reconstruct(_)) => all(args, &mut eye, &photo, &camera, &species, &mut warnings)?,
+        Err(PortraitError::Sight(error)) => return Err(CommandError::failed(error.name(), &error)),
+    };
+    write(args, &mut fitted, &species, &photo, &camera)?;
+    let plants = fitted.into_iter().map(|plant| plant.described.report).collect();
+    let exit = if args.all && failures > 0 { Exit::Partial } else { Exit::Done };
+    output.plants(&Document { plants, warnings, seconds: Some(started.elapsed().as_secs_f64()) })?;
+    Ok(exit)
+}
+
+/// Every plant by its organs, the largest first, or the largest that can be fitted; and how many could not.
+fn all(
+    args: &Args,
+    eye: &mut Eye,
+    photo: &Rgb,
+    camera: &Intrinsics,
+    species: &Species,
+    warnings: &mut Vec<String>,
+) -> Result<(Vec<Portrait>, usize), CommandError> {
+    let sight = eye.look(photo, camera, None).map_err(|error| CommandError::failed(error.name(), &error))?;
+    warnings.extend(sight.degraded.iter().map(ToString::to_string));
     let (scale_source, mut seen) = (sight.scale_source, sight.plants);
     if seen.is_empty() {
         let organs = sight.refused.iter().map(|r| r.instances.len()).sum::<usize>();
@@ -103,7 +120,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let mut fitted = Vec::new();
     let mut failures: Vec<ReconstructError> = Vec::new();
     for sight in seen {
-        match fit(sight, &species, &camera, scale_source) {
+        match Portrait::of(sight, species, camera, scale_source) {
             Ok(plant) => fitted.push(plant),
             Err(error) => {
                 warnings.push(format!("a plant could not be fitted: {}", chain(&error)));
@@ -117,42 +134,12 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     if let (true, Some(error)) = (fitted.is_empty(), failures.first()) {
         return Err(CommandError::failed(error.name(), error));
     }
-    write(args, &mut fitted, &species, &photo, &camera)?;
-    let plants = fitted.into_iter().map(|plant| plant.described.report).collect();
-    let exit = if args.all && !failures.is_empty() { Exit::Partial } else { Exit::Done };
-    output.plants(&Document { plants, warnings, seconds: Some(started.elapsed().as_secs_f64()) })?;
-    Ok(exit)
-}
-
-fn fit(
-    sight: PlantSight,
-    species: &Species,
-    camera: &Intrinsics,
-    scale_source: ScaleSource,
-) -> Result<Fitted, ReconstructError> {
-    let (stand_in, cut) = (sight.plant.stand_in, sight.plant.touches_border);
-    // Without a pose the camera is taken to be level: up is up in the picture.
-    let (mut fitted, mut cloud) = fit_organs(sight.plant.organs, species, DVec3::NEG_Y)?;
-    // The world is unknown: the plant is recorded at its own origin, and where that is seen from is reported.
-    let camera_from_plant = std::mem::replace(&mut fitted.plant.world_from_plant, Pose::IDENTITY);
-    let plant_from_camera = camera_from_plant.inverse();
-    cloud.iter_mut().for_each(|p| *p = plant_from_camera.point(*p));
-    let mut described = describe(&fitted, species, &cloud, scale_source, Encoding::Compact)?;
-    described.report.camera = Some(Camera { intrinsics: *camera, camera_from_plant });
-    let in_camera = Plant { world_from_plant: camera_from_plant, ..described.plant.clone() };
-    let warnings = &mut described.report.warnings;
-    if stand_in {
-        warnings.push("no main stem was seen: one was put through the leaves' bases".into());
-    }
-    if cut {
-        warnings.push("the plant is cut by the photo's border".into());
-    }
-    Ok(Fitted { described, in_camera })
+    Ok((fitted, failures.len()))
 }
 
 fn write(
     args: &Args,
-    fitted: &mut [Fitted],
+    fitted: &mut [Portrait],
     species: &Species,
     photo: &Rgb,
     camera: &Intrinsics,
@@ -178,7 +165,7 @@ fn write(
 
 fn write_overlay(
     path: &Path,
-    fitted: &[Fitted],
+    fitted: &[Portrait],
     species: &Species,
     photo: &Rgb,
     camera: &Intrinsics,

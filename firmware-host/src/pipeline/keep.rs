@@ -102,7 +102,8 @@ impl Keeper<'_> {
 
     fn new_plant(&self, closed: &Closed<FrameKey, BestView>, id: String) -> Result<NewPlant, ReconstructError> {
         let (best, species) = (&closed.best, self.run.species);
-        let (fitted, cloud) = fit_organs(best.organs.clone(), species, glam::DVec3::Z)?;
+        let (fitted, tree) = fit_organs(best.organs.clone(), species, glam::DVec3::Z)?;
+        let cloud: Vec<_> = tree.organs.into_iter().flat_map(|organ| organ.points).collect();
         let mut made = describe(&fitted, species, &cloud, best.scale_source, Encoding::Compact)?;
         made.report.id = Some(id);
         if best.stand_in {

@@ -129,7 +129,7 @@ fn observations(
                 whole,
                 scale_source,
                 world_from_camera,
-                crop: Crop::around(rgb, camera, seen.bounds),
+                crop: Crop::around(rgb, camera, seen.bounds, Crop::THUMBNAIL),
                 stamp: frame.stamp.clone(),
             },
         }

@@ -27,7 +27,7 @@ pub use error::FitError;
 pub(crate) use error::{MIN_EXTENT, MIN_POINTS};
 use glam::{DQuat, DVec3};
 pub use lone::{LoneBlade, lone_blade};
-pub use pictured::{NODES, Pictured, pictured};
+pub use pictured::{NODES, Pictured, pictured, to_picture};
 
 use crate::cloud::thinned;
 use crate::model::{Plant, PlantError, Similarity, Species};

@@ -5,12 +5,12 @@ use glam::{DQuat, DVec3};
 use nalgebra::DVector;
 
 use super::builder::{Builder, Source};
-use super::leaf::state::State;
 use super::leaf;
+use super::leaf::state::State;
 use super::solver::{Normal, minimise};
 use super::{FitError, Fitted, hanger};
-use crate::model::leaf::Lattice;
-use crate::model::{OrganKind, Plant, Similarity, Species};
+use crate::model::leaf::{Lattice, gauge};
+use crate::model::{Form, OrganKind, Plant, PlantError, Similarity, Species, forward};
 
 /// The nodes of a blade that are looked for in a picture.
 pub const NODES: Lattice = Lattice::every(4, 7);
@@ -55,6 +55,41 @@ pub fn pictured(stem: &[DVec3], blades: &[Pictured], species: &Species, up: DVec
     let plant = Plant { world_from_plant, organs: builder.organs };
     plant.validate()?;
     Ok(Fitted { plant, organs: builder.fits, dropped: Vec::new() })
+}
+
+/// Moves blades of a plant fitted in the camera's frame to where its picture shows them: turn, size, shape and bends of
+/// each; where they hang stands. `shown` gives each organ of the tree that is seen.
+///
+/// # Errors
+/// [`PlantError`] when the plant is none.
+pub fn to_picture(
+    fitted: &mut Fitted,
+    shown: impl Fn(usize, DVec3) -> Option<Pictured>,
+    species: &Species,
+    up: DVec3,
+) -> Result<(), PlantError> {
+    let posed = forward(&fitted.plant, species)?;
+    for (organ, fit) in fitted.organs.iter_mut().enumerate() {
+        let Some(parent) = fitted.plant.organs[organ].parent else { continue };
+        let (Form::Leaf { leaf, .. }, Form::Stem { gamma, .. }) =
+            (&fitted.plant.organs[organ].form, &fitted.plant.organs[parent].form)
+        else {
+            continue;
+        };
+        let Some(blade) = fit.source.and_then(|source| shown(source, posed.world_from_organ[organ].translation)) else {
+            continue;
+        };
+        let joint = posed.world_from_organ[parent].at(&species.stem.curve(gamma), fitted.plant.organs[organ].joint.d);
+        let (state, converged) = blade.fitted(joint.translation, up, species);
+        let turn = state.rotation * gauge(&species.leaf.points(&state.blade(), Lattice::WHOLE)).inverse();
+        let form = Form::Leaf { blade: state.blade(), leaf: *leaf };
+        fit.converged = converged;
+        let organ = &mut fitted.plant.organs[organ];
+        organ.joint.rotation = hanger::relative(joint.rotation, turn.normalize());
+        organ.joint.scale = state.metres() / joint.scale;
+        organ.form = form;
+    }
+    fitted.plant.validate()
 }
 
 impl Pictured {
@@ -135,5 +170,92 @@ impl Pins {
         let width = species.priors.ln_width;
         normal.prior(State::COEFFICIENTS + coefficients - 1, state.log_width - width.mean, width.sd.powi(-2));
         normal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::leaf::Blade;
+    use crate::species::shipped;
+
+    const METRES: f64 = 0.4;
+
+    /// A bent blade of maize a metre and a half before the camera, and its nodes.
+    fn blade(species: &Species) -> (State, Vec<DVec3>) {
+        let wave = |k: usize| (k as f64 * 1.7).sin();
+        let state = State {
+            base: DVec3::new(0.05, 0.1, 1.5),
+            // The picture's y points down: tips rise.
+            rotation: DQuat::from_rotation_z(2.3) * DQuat::from_rotation_y(1.3),
+            log_length: METRES.ln(),
+            log_width: species.priors.ln_width.mean,
+            beta: (0..species.leaf.shape.rank()).map(|k| 0.5 * wave(k)).collect(),
+            gamma: (0..species.leaf.deform.rank()).map(wave).collect(),
+        };
+        let nodes = species.leaf.points(&state.blade(), NODES).into_iter().map(|p| state.place(p)).collect();
+        (state, nodes)
+    }
+
+    fn stem(base: DVec3) -> Vec<DVec3> {
+        let around = |k: usize| DVec3::new((k as f64).cos(), 0.0, -(k as f64).sin().abs()) * 0.008;
+        (0..300).map(|k| base + DVec3::Y * (0.2 - 0.4 * k as f64 / 300.0) + around(k)).collect()
+    }
+
+    #[test]
+    fn gradients_agree_with_finite_differences() {
+        let species = shipped("maize").expect("listed").expect("valid");
+        let (state, mut nodes) = blade(&species);
+        nodes.iter_mut().enumerate().for_each(|(k, p)| *p += DVec3::new(0.01, -0.007, 0.02) * (k as f64).cos());
+        let pins = Pins::of(&Pictured { nodes, pixel: 0.002 }, &state, &species);
+        let at = pins.normal(&state, &species);
+        for k in 0..at.g.len() {
+            let cost = |by: f64| {
+                let mut step = DVector::zeros(at.g.len());
+                step[k] = by;
+                pins.normal(&state.stepped(&step, &species), &species).cost
+            };
+            let h = 1e-5;
+            let finite = (cost(h) - cost(-h)) / (4.0 * h);
+            assert!((finite - at.g[k]).abs() <= 1e-4 * (1.0 + at.g.amax()), "parameter {k}: {finite} {}", at.g[k]);
+        }
+    }
+
+    #[test]
+    fn a_pictured_blade_comes_back() {
+        let species = shipped("maize").expect("listed").expect("valid");
+        let (state, nodes) = blade(&species);
+        let pixel = 0.002;
+        for mirrored in [false, true] {
+            let mut shown = nodes.clone();
+            if mirrored {
+                shown.chunks_exact_mut(NODES.columns()).for_each(<[DVec3]>::reverse);
+            }
+            let blades = [Pictured { nodes: shown, pixel }];
+            let fitted = pictured(&stem(state.base), &blades, &species, DVec3::NEG_Y).unwrap();
+            assert_eq!(fitted.plant.organs[1].kind(), OrganKind::Leaf);
+            let posed = crate::model::forward(&fitted.plant, &species).unwrap();
+            let tip = |p: DVec3| (p / p.z).truncate() * 1.5;
+            let found = posed.control[1][posed.control[1].len() - 1];
+            let away = tip(found).distance(tip(nodes[nodes.len() - 1]));
+            assert!(away < 4.0 * pixel, "the tip is {away} m off");
+            let length = posed.world_from_organ[1].scale;
+            assert!((length / METRES - 1.0).abs() < 0.1, "{length}");
+            let Form::Leaf { blade: Blade { beta, gamma, .. }, .. } = &fitted.plant.organs[1].form else {
+                panic!("a leaf")
+            };
+            assert!(beta.iter().chain(gamma).all(|c| c.abs() <= 3.0));
+        }
+    }
+
+    #[test]
+    fn no_stem_is_a_typed_error() {
+        let species = shipped("maize").expect("listed").expect("valid");
+        let (_, nodes) = blade(&species);
+        for stem in [vec![], vec![DVec3::Z; 9], vec![DVec3::NAN; 9]] {
+            assert!(
+                pictured(&stem, &[Pictured { nodes: nodes.clone(), pixel: 0.002 }], &species, DVec3::NEG_Y).is_err()
+            );
+        }
     }
 }

@@ -16,7 +16,10 @@ mod instances2d;
 mod join;
 mod lift;
 mod overlay;
+mod patches;
 mod scale;
+mod sharpen;
+mod shown;
 pub mod strap;
 mod track;
 
@@ -27,7 +30,10 @@ pub use group::{GroupError, PlantView, Refused, group};
 pub use instances2d::{Region, divided, instances};
 pub use lift::{DropReason, Dropped, Lifted, LiftedOrgan, lift};
 pub use overlay::overlay;
+pub use patches::{Patch, patches};
 pub use scale::{DepthScale, ScaleError, ground_plane, nominal};
+pub use sharpen::sharpened;
+pub use shown::shown;
 pub use track::{Closed, Gate, Observation, Quality, Tracker};
 
 /// What a network says of one picture, at the network's size, and the camera that took it at that size.

@@ -120,7 +120,7 @@ fn methods(points: &[DVec3], up: DVec3, species: &Species, quick: bool) -> Vec<(
 }
 
 /// Time that this thread has spent on a processor, milliseconds: other work on the machine does not lengthen it.
-fn processor_ms() -> f64 {
+pub(super) fn processor_ms() -> f64 {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
 }

@@ -15,6 +15,7 @@ mod depth;
 mod fit;
 mod green;
 mod leaf;
+mod photo;
 mod picture;
 mod release;
 mod segment;
@@ -38,6 +39,8 @@ enum Which {
     Fit(fit::Args),
     /// Chamfer distance and time of single blades, beside loose surfaces.
     Leaf(leaf::Args),
+    /// Plants of one photo: counts, outlines, lengths, other views, rows.
+    Photo(photo::Args),
     /// Clouds divided into organs without their labels: instances, classes, blades, stems.
     Segment(segment::Args),
     /// Share of organs with the right parent.
@@ -55,6 +58,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         Which::Depth(args) => depth::table(args)?,
         Which::Fit(args) => fit::table(args)?,
         Which::Leaf(args) => leaf::table(args)?,
+        Which::Photo(args) => photo::table(args)?,
         Which::Segment(args) => segment::table(args)?,
         Which::Topology(args) => topology::table(args)?,
         Which::Traits(args) => traits::table(args)?,

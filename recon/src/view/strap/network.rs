@@ -1,8 +1,9 @@
 //! A silhouette's middle lines as a graph.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::silhouette::Silhouette;
+use crate::nearest::Nearest;
 
 /// Side lines shorter than this many radii of the shape at their joint come of its raggedness (a guess: a blade's tip
 /// stands farther out).
@@ -14,6 +15,8 @@ const ROUNDS: usize = 12;
 const GAP: f64 = 0.04;
 /// Most parts that are joined, the largest first; the rest are specks.
 const MAX_PARTS: usize = 32;
+/// Most lines of a plant: what follows looks at pairs of them, and the largest maize has some two hundred.
+const MAX_LINES: usize = 2_000;
 /// A line's direction at a node is taken over this many radii, from outside the node's disc on.
 const BASELINE: f64 = 3.0;
 /// And at least over so many pixels.
@@ -44,8 +47,8 @@ pub(super) struct Network {
 }
 
 impl Network {
-    /// Of a silhouette: thinned, its parts joined, spurs pruned.
-    pub(super) fn of(shape: &Silhouette) -> Self {
+    /// Of a silhouette: thinned, its parts joined, spurs pruned; `None` when it has too many lines for a plant.
+    pub(super) fn of(shape: &Silhouette) -> Option<Self> {
         let radii = shape.radii();
         let mut thin = Thin::of(shape);
         thin.join();
@@ -63,7 +66,7 @@ impl Network {
             }
             network = thin.network(network.radii);
         }
-        network.merged()
+        (network.lines.len() <= MAX_LINES).then(|| network.merged())
     }
 
     /// Place of a pixel's centre.
@@ -195,25 +198,23 @@ impl Thin {
     /// Draws straight lines over the gaps between parts of one plant; what lies farther off goes.
     fn join(&mut self) {
         let width = self.shape.width();
-        let place = |p: usize| ((p % width) as f64, (p / width) as f64);
+        let place = |p: usize| DVec3::new((p % width) as f64, (p / width) as f64, 0.0);
         let mut parts = self.parts().into_iter();
         let Some(mut whole) = parts.next() else { return };
         let diagonal = (width as f64).hypot(self.shape.height() as f64);
         for (k, part) in parts.enumerate() {
-            let apart = |(a, b): &(usize, usize)| {
-                let ((ax, ay), (bx, by)) = (place(*a), place(*b));
-                (ax - bx).powi(2) + (ay - by).powi(2)
-            };
-            let pairs = part.iter().flat_map(|&a| whole.iter().map(move |&b| (a, b)));
-            let nearest = pairs.filter(|_| k < MAX_PARTS).min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            match nearest.filter(|pair| apart(pair) <= (GAP * diagonal).powi(2)) {
-                Some((a, b)) => {
-                    let ((ax, ay), (bx, by)) = (place(a), place(b));
-                    let steps = (ax - bx).abs().max((ay - by).abs()).max(1.0);
-                    for k in 0..=steps as usize {
-                        let t = k as f64 / steps;
-                        let (x, y) = ((ax + (bx - ax) * t).round() as usize, (ay + (by - ay) * t).round() as usize);
-                        self.inside[y * width + x] = true;
+            let tree = Nearest::of(&part.iter().map(|&p| place(p)).collect::<Vec<_>>());
+            let gap = |&p: &usize| Some((tree.one(place(p))?, p));
+            let searched = if k < MAX_PARTS { &whole[..] } else { &[] };
+            let nearest =
+                searched.iter().filter_map(gap).min_by(|a, b| a.0.distance_squared.total_cmp(&b.0.distance_squared));
+            match nearest.filter(|(found, _)| found.distance() <= GAP * diagonal) {
+                Some((found, from)) => {
+                    let (from, to) = (place(from), place(part[found.index]));
+                    let steps = (from - to).abs().max_element().max(1.0) as usize;
+                    for k in 0..=steps {
+                        let at = from.lerp(to, k as f64 / steps as f64).round();
+                        self.inside[at.y as usize * width + at.x as usize] = true;
                     }
                     whole.extend(part);
                 }

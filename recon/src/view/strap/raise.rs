@@ -8,8 +8,8 @@ use glam::{DVec2, DVec3};
 
 use super::trace::{Sketch, Stroke};
 use crate::fit::{NODES, Pictured};
-use crate::model::leaf::{ROWS, Side, VEIN, node};
 use crate::model::Species;
+use crate::model::leaf::{ROWS, Side, VEIN, node};
 use crate::polyline::path_length;
 use crate::statistics::quantile;
 

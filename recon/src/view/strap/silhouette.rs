@@ -195,7 +195,8 @@ mod tests {
 
     #[test]
     fn a_bar_thins_to_a_line_nearly_as_long() {
-        let bar = GrayImage::from_fn(60, 20, |x, y| image::Luma([u8::from((5..55).contains(&x) && (7..12).contains(&y))]));
+        let bar =
+            GrayImage::from_fn(60, 20, |x, y| image::Luma([u8::from((5..55).contains(&x) && (7..12).contains(&y))]));
         let thin = Silhouette::of(&bar).thinned();
         let columns = (0..60).filter(|x| (0..20).any(|y| thin.inside[y * 60 + x])).count();
         assert!((44..=50).contains(&columns), "{columns}");
