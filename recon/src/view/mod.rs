@@ -5,6 +5,8 @@
 //!            (2D)       (scale)
 //! ```
 //!
+//! Grasses seen from the side go another way, by their silhouette alone: see [`strap`].
+//!
 //! Spec: reconstruction.md "Lifting one view"; paper "Single Image Reconstruction" and supp. "2D Reconstruction".
 //! Numbers of pixels are stated for a 640 x 480 picture and scale with its area (see [`View::pixels`]), lengths in
 //! pixels with its diagonal.

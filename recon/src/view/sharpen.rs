@@ -43,25 +43,33 @@ pub fn sharpened(picture: &Rgb, plant: &Mask) -> GrayImage {
     mask
 }
 
-/// Empties the straight dark edges of cabinets and windows.
+/// Empties the straight dark edges of cabinets and windows: filled lines along the border with none further in.
 fn drop_frame(mask: &mut GrayImage) {
     let (width, height) = mask.dimensions();
-    let is_frame = |at: u32, of: u32, filled: usize, length: u32| {
-        let depth = f64::from(at.min(of - 1 - at));
-        depth < FRAME_DEPTH * f64::from(of) && filled as f64 > FRAME_FILL * f64::from(length)
-    };
-    let wide = |at: u32, of: u32| at.saturating_sub(FRAME_BLUR)..(at + FRAME_BLUR + 1).min(of);
     let seen = mask.clone();
-    for x in 0..width {
-        if is_frame(x, width, (0..height).filter(|&y| seen.get_pixel(x, y).0[0] > 0).count(), height) {
-            wide(x, width).for_each(|x| (0..height).for_each(|y| mask.get_pixel_mut(x, y).0[0] = 0));
+    let column = |x: u32| (0..height).filter(|&y| seen.get_pixel(x, y).0[0] > 0).count() as f64 / f64::from(height);
+    let row = |y: u32| (0..width).filter(|&x| seen.get_pixel(x, y).0[0] > 0).count() as f64 / f64::from(width);
+    for x in frame(width, column) {
+        (0..height).for_each(|y| mask.put_pixel(x, y, image::Luma([0])));
+    }
+    for y in frame(height, row) {
+        (0..width).for_each(|x| mask.put_pixel(x, y, image::Luma([0])));
+    }
+}
+
+/// Which of `count` lines belong to a frame at either end, by the share of each that the mask fills.
+fn frame(count: u32, filled: impl Fn(u32) -> f64) -> Vec<u32> {
+    let depth = (FRAME_DEPTH * f64::from(count)) as u32;
+    let is_full = |at: u32| filled(at) > FRAME_FILL;
+    let mut lines = Vec::new();
+    for at in 0..depth {
+        for (line, inner) in [(at, depth), (count - 1 - at, count - 1 - depth)] {
+            if is_full(line) && !is_full(inner) {
+                lines.extend(line.saturating_sub(FRAME_BLUR)..(line + FRAME_BLUR + 1).min(count));
+            }
         }
     }
-    for y in 0..height {
-        if is_frame(y, height, (0..width).filter(|&x| seen.get_pixel(x, y).0[0] > 0).count(), width) {
-            wide(y, height).for_each(|y| (0..width).for_each(|x| mask.get_pixel_mut(x, y).0[0] = 0));
-        }
-    }
+    lines
 }
 
 /// How much likelier each colour is on plants than beside them.
@@ -160,6 +168,17 @@ mod tests {
         let mask = sharpened(&picture, &plant);
         let wrong = mask.enumerate_pixels().filter(|(x, y, v)| (v.0[0] > 0) != is_plant(*x, *y)).count();
         assert!(wrong <= 4, "{wrong} of {} pixels", mask.len());
+    }
+
+    #[test]
+    fn dark_edges_of_a_cabinet_are_no_plant_and_what_fills_the_picture_is() {
+        let wall = |x: u32| x < 4 || (60..64).contains(&x);
+        let mut mask = GrayImage::from_fn(128, 128, |x, _| Luma([if wall(x) { 255 } else { 0 }]));
+        drop_frame(&mut mask);
+        assert!(mask.enumerate_pixels().all(|(x, _, v)| (v.0[0] > 0) == (60..64).contains(&x)));
+        let mut full = GrayImage::from_pixel(128, 128, Luma([255]));
+        drop_frame(&mut full);
+        assert!(full.pixels().all(|v| v.0[0] > 0));
     }
 
     #[test]

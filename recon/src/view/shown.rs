@@ -7,8 +7,9 @@ use crate::fit::{NODES, Pictured};
 use crate::organs::OrganCloud;
 use crate::statistics::quantile;
 
-/// Shares of the pixels across and along that are taken for a blade's edges: strays lie beyond.
-const EDGES: [f64; 2] = [0.02, 0.98];
+/// Shares of the pixels across that are taken for a blade's edges, and along for its far end: strays lie beyond.
+const EDGES: [f64; 2] = [0.01, 0.99];
+const END: f64 = 0.995;
 /// Fewest pixels across which edges can be told.
 const MIN_PIXELS: usize = 3;
 
@@ -26,7 +27,7 @@ pub fn shown(organ: &OrganCloud, base: DVec3, camera: &Intrinsics) -> Option<Pic
     let axis = (middle - foot).try_normalize()?;
     let along: Vec<f64> = pixels.iter().map(|p| (*p - foot).dot(axis)).collect();
     let across: Vec<f64> = pixels.iter().map(|p| (*p - foot).perp_dot(axis)).collect();
-    let length = quantile(&along, EDGES[1])?;
+    let length = quantile(&along, END)?;
     let depth = Plane::through(&pixels, &organ.points)?;
     let (rows, columns) = (NODES.rows(), NODES.columns());
     let band = length / (rows - 1) as f64;
