@@ -373,7 +373,7 @@ mod tests {
         }
         // Noise has more lines than any plant, and must not take longer.
         let mut rng = crate::world::seeded(1);
-        let noise = GrayImage::from_fn(800, 800, |_, _| Luma([u8::from(rand::Rng::random_bool(&mut rng, 0.4))]));
+        let noise = GrayImage::from_fn(400, 400, |_, _| Luma([u8::from(rand::Rng::random_bool(&mut rng, 0.4))]));
         assert_eq!(Sketch::of(&Silhouette::of(&noise)), None);
     }
 }
