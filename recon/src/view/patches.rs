@@ -29,11 +29,8 @@ pub fn patches(mask: &GrayImage) -> Vec<Patch> {
             let [x0, y0, x1, y1] = bounds;
             bounds = [x0.min(x as u32), y0.min(y as u32), x1.max(x as u32 + 1), y1.max(y as u32 + 1)];
             for j in y.saturating_sub(1)..(y + 2).min(height) {
-                for q in j * width + x.saturating_sub(1)..j * width + (x + 2).min(width) {
-                    if std::mem::replace(&mut left[q], false) {
-                        pixels.push(q);
-                    }
-                }
+                let beside = x.saturating_sub(1)..(x + 2).min(width);
+                pixels.extend(beside.map(|i| j * width + i).filter(|&q| std::mem::replace(&mut left[q], false)));
             }
             next += 1;
         }

@@ -167,7 +167,7 @@ impl Thin {
     fn neighbours(&self, p: usize) -> impl Iterator<Item = usize> + use<> {
         let ring = self.shape.ring(p);
         let inside = ring.map(|q| self.inside[q]);
-        let is_step = move |k: usize| inside[k] && (k % 2 == 0 || !(inside[k - 1] || inside[(k + 1) % 8]));
+        let is_step = move |k: usize| inside[k] && (k.is_multiple_of(2) || !(inside[k - 1] || inside[(k + 1) % 8]));
         (0..8).filter(move |&k| is_step(k)).map(move |k| ring[k])
     }
 

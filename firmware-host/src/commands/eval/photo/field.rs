@@ -1,5 +1,8 @@
 //! field-rows: plants on row lines.
 
+use std::path::Path;
+
+use demeter_capture::decode_photo;
 use demeter_recon::view::patches;
 use image::GrayImage;
 
@@ -26,8 +29,7 @@ pub(super) fn figures(run: &Run<'_>, notes: &mut Vec<String>) -> Result<Vec<Figu
         bar.inc(1);
         let photo = Run::read(&mut eye, &path)?;
         let label = run.data.join(FOLDER).join("label").join(path.file_name().unwrap_or_default());
-        let lines =
-            lines(&files::read(&label)?).map_err(|error| CommandError::failed("bad_image", &error).of(&label))?;
+        let lines = lines(&label)?;
         let started = processor_ms();
         let sight = eye.look(&photo.rgb, &photo.camera, None);
         seconds.push((processor_ms() - started) / 1e3);
@@ -70,8 +72,9 @@ pub(super) fn figures(run: &Run<'_>, notes: &mut Vec<String>) -> Result<Vec<Figu
 /// Pixels of the labelled lines, in shares of the picture.
 struct Lines(Vec<[f64; 2]>);
 
-fn lines(bytes: &[u8]) -> Result<Lines, image::ImageError> {
-    let label = image::load_from_memory(bytes)?.to_luma8();
+fn lines(path: &Path) -> Result<Lines, CommandError> {
+    let label =
+        decode_photo(&files::read(path)?).map_err(|error| CommandError::failed("bad_image", &error).of(path))?;
     let (width, height) = (f64::from(label.width()), f64::from(label.height()));
     let marked = label.enumerate_pixels().filter(|(_, _, p)| p.0[0] > 127);
     Ok(Lines(marked.map(|(x, y, _)| [(f64::from(x) + 0.5) / width, (f64::from(y) + 0.5) / height]).collect()))

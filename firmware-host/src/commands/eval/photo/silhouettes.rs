@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use demeter_capture::decode_photo;
 use demeter_frame::{Intrinsics, Pose};
 use demeter_recon::model::Species;
 use demeter_recon::view::patches;
@@ -140,9 +141,9 @@ fn sides(folder: &Path) -> Result<(Intrinsics, Vec<Side>), CommandError> {
     let mut sides = Vec::new();
     for degrees in (0..360).step_by(30) {
         let path = folder.join(format!("bin/side/{degrees}.png"));
-        let silhouette = image::load_from_memory(&files::read(&path)?)
-            .map_err(|error| CommandError::failed("bad_image", &error).of(&path))?
-            .to_luma8();
+        let picture =
+            decode_photo(&files::read(&path)?).map_err(|error| CommandError::failed("bad_image", &error).of(&path))?;
+        let silhouette = image::DynamicImage::ImageRgb8(picture).to_luma8();
         let turn = sign * f64::from(degrees).to_radians() * calibration.angle_factor;
         let world_from_plant = Pose::new(DQuat::from_rotation_z(turn), DVec3::ZERO);
         sides.push(Side { silhouette, camera_from_plant: world_from_camera.inverse().then(&world_from_plant) });
