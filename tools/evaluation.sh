@@ -9,7 +9,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 every=${EVERY:-1}
 helios=${HELIOS:-.cache/helios/sets}
 demeter=target/debug/demeter
-[ -d "$helios/clean" ] || tools/helios/sets.sh "$helios"
+[ -d "$helios/clean" ] || tools/helios/sets.sh "$helios" "$(tools/helios/python.sh)" judge
 
 poisson=()
 [ -z "${POISSON:-}" ] || poisson=(--poisson "$POISSON")
@@ -19,7 +19,7 @@ page=$(mktemp)
 # Evaluation
 
 Made by \`make evaluation\` at commit $(git log -1 --format=%h$(git diff --quiet HEAD || echo +changes)), step ${every} through the clouds and plants of each set; definitions are in
-spec/reconstruction.md "Metrics", goals in issue 3. Nothing was learned from or tuned on the shared clouds: they are for
+spec/reconstruction.md "Metrics", goals in issues 3 and 4. Nothing was learned from or tuned on the shared clouds: they are for
 evaluation only. The program is built with the dev profile (opt-level 3), as everywhere.
 
 ## Whole plants
@@ -58,6 +58,32 @@ surface$([ $set = clean ] || echo "; each coordinate has 5 mm of Gaussian noise 
 END
         "$demeter" eval traits --truth "$helios/$set" --every "$every"
     done
+    cat <<END
+
+## Organs
+
+\`demeter eval segment\`: the same scans with their labels hidden, divided by geometry and by geometry and organ3d together;
+then plants of pyhelios3d and points of the authors' five plants, which have their stems apart.
+
+END
+    "$demeter" eval segment --every "$every"
+    "$demeter" eval segment --clouds "$helios/clean" --release ../shared/data/demeter-release/soybean --every $((2 * every))
+    cat <<END
+
+## Photos
+
+\`demeter eval photo\`: one picture, one plant (or a row), judged by real photos and silhouettes.
+
+END
+    "$demeter" eval photo --every "$every"
+    cat <<END
+
+## Depth and camera
+
+\`demeter eval depth\`: organ2d alone on single pictures.
+
+END
+    "$demeter" eval depth --every "$every"
     cat <<END
 
 ## Parents

@@ -14,11 +14,7 @@ helios="pyhelios3d 0.1.38 (MIT, LGPL-2.1+)"
 scans="leaf scans (MIT, (c) 2020 oceam)"
 
 mkdir -p "$cache/learned" recon/species
-python=.cache/helios/bin/python
-[ -x $python ] || {
-    python3 -m venv .cache/helios
-    $python -m pip install --quiet -r tools/helios/requirements.txt
-}
+python=$(tools/helios/python.sh)
 if [ ! -f "$plants/complete" ]; then
     tools/helios/sets.sh "$cache" $python train
     touch "$plants/complete"

@@ -6,11 +6,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 folder=$1
 count=$2
-python=.cache/helios/bin/python
-[ -x $python ] || {
-    python3 -m venv .cache/helios
-    $python -m pip install --quiet -r tools/helios/requirements.txt
-}
+python=$(tools/helios/python.sh)
 leaflets=()
 [ ! -d ../shared/data/soybean-leaflets ] || leaflets=(--leaflets ../shared/data/soybean-leaflets)
 [ -f "$folder/assets/meta.json" ] ||
