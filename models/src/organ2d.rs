@@ -2,10 +2,11 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use demeter_frame::{Depth, Mask, Rgb, Semantic};
-use image::imageops::{FilterType, resize};
+use image::imageops::FilterType;
 use image::{GrayImage, ImageBuffer, Luma};
-use ndarray::{Array4, ArrayView2, Axis, s};
+use ndarray::{ArrayView2, Axis, s};
 
+use crate::pixels::{dimensions, planes, resized};
 use crate::{CameraGuess, Layout, Model, ModelError, Port, Runtime};
 
 /// The network halves its input four times, so sides are multiples of this many pixels.
@@ -97,12 +98,10 @@ impl Organ2d {
     /// # Errors
     /// [`ModelError::EmptyImage`], [`ModelError::Shape`], and those of [`Model::run`].
     pub fn run(&mut self, image: &Rgb) -> Result<OrganMaps, ModelError> {
-        let (width, height) = image.dimensions();
-        if width == 0 || height == 0 {
-            return Err(ModelError::EmptyImage { width, height });
-        }
+        let (width, height) = dimensions(image)?;
         let (w, h) = working_size(width, height, self.long_side);
-        let outputs = self.model.run(&[("image", tensor(image, w, h).into())])?;
+        let picture = planes(&resized(image, (w, h), FilterType::Triangle), |_, value| value / 255.0);
+        let outputs = self.model.run(&[("image", picture.insert_axis(Axis(0)).into())])?;
         let map = |name, channels| outputs.f32(name, [1, channels, i64::from(h), i64::from(w)]);
         // Softmax; the largest logit is taken off first so that nothing overflows.
         let mut sem = map("sem", Semantic::ALL.len() as i64)?.index_axis(Axis(0), 0).to_owned();
@@ -146,25 +145,6 @@ fn working_size(width: u32, height: u32, long_side: u32) -> (u32, u32) {
     (side(width), side(height))
 }
 
-/// The image as `[1, 3, h, w]` in 0..=1. The triangle filter is bilinear when it enlarges; when it shrinks it widens
-/// with the step, so that every pixel of the original counts as in an area mean.
-fn tensor(image: &Rgb, w: u32, h: u32) -> Array4<f32> {
-    let resized;
-    let image = if image.dimensions() == (w, h) {
-        image
-    } else {
-        resized = resize(image, w, h, FilterType::Triangle);
-        &resized
-    };
-    let mut tensor = Array4::zeros((1, 3, h as usize, w as usize));
-    for (channel, mut plane) in tensor.index_axis_mut(Axis(0), 0).outer_iter_mut().enumerate() {
-        for (value, pixel) in plane.iter_mut().zip(image.pixels()) {
-            *value = f32::from(pixel.0[channel]) / 255.0;
-        }
-    }
-    tensor
-}
-
 fn raster(values: ArrayView2<'_, f32>) -> ImageBuffer<Luma<f32>, Vec<f32>> {
     let (height, width) = values.dim();
     let mut raster = ImageBuffer::new(width as u32, height as u32);
@@ -189,17 +169,6 @@ mod tests {
             assert!(w % 16 == 0 && h % 16 == 0 && w.max(h) == 512, "{w} x {h}");
             let exact = f64::from(width.min(height)) / f64::from(width.max(height)) * 512.0;
             assert!((f64::from(w.min(h)) - exact).abs() <= 8.0, "{w} x {h}");
-        }
-    }
-
-    #[test]
-    fn a_tensor_keeps_channels_and_means() {
-        let image = Rgb::from_fn(128, 64, |x, y| image::Rgb([(x * 2 % 256) as u8, 100, (y * 4 % 256) as u8]));
-        let tensor = tensor(&image, 64, 32);
-        assert_eq!(tensor.shape(), [1, 3, 32, 64]);
-        let mean = |channel: usize| tensor.index_axis(Axis(1), channel).mean().unwrap() * 255.0;
-        for (channel, expected) in [(0, 127.0), (1, 100.0), (2, 126.0)] {
-            assert!((mean(channel) - expected).abs() < 1.0, "channel {channel}: {}", mean(channel));
         }
     }
 }

@@ -103,4 +103,15 @@ mod tests {
         let wide = stretched(map.view(), (6, 2));
         assert_eq!(&wide.as_raw()[..6], &[0.0, 2.5, 7.5, 12.5, 17.5, 20.0]);
     }
+
+    #[test]
+    fn planes_keep_channels_and_shrinking_keeps_means() {
+        let image = Rgb::from_fn(128, 64, |x, y| image::Rgb([(x * 2 % 256) as u8, 100, (y * 4 % 256) as u8]));
+        let planes = planes(&resized(&image, (64, 32), FilterType::Triangle), |_, value| value);
+        assert_eq!(planes.shape(), [3, 32, 64]);
+        for (plane, expected) in planes.outer_iter().zip([127.0, 100.0, 126.0]) {
+            let mean = plane.mean().unwrap();
+            assert!((mean - expected).abs() < 1.0, "{mean}, not {expected}");
+        }
+    }
 }

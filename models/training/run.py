@@ -1,8 +1,14 @@
-"""A training run that can be stopped and continued: what a checkpoint keeps, and the loop around it."""
+"""The command line of a training run, and the run itself, which can be stopped and continued: what a checkpoint keeps,
+and the loop around it."""
 
+import argparse
 import copy
 import math
 import os
+import pathlib
+import shlex
+import sys
+import tempfile
 import time
 
 import numpy as np
@@ -13,6 +19,32 @@ SAVE_EVERY_SECS = 60
 LOG_EVERY_STEPS = 50
 AVERAGED = 0.998
 LARGEST_GRADIENT = 2.0
+MODELS = pathlib.Path(__file__).resolve().parent.parent
+
+
+def arguments(network, data):
+    """The options of a network's training; `data` says what makes its data."""
+    parser = argparse.ArgumentParser(description=f"Trains {network} and writes {network}.onnx, its manifest and its pins.")
+    parser.add_argument("--data", action="append", default=[], metavar="DIR", help=f"of {data}")
+    parser.add_argument("--minutes", type=float, default=55.0, help="time for this run, over all its restarts")
+    parser.add_argument("--seed", type=int, default=1)
+    checkpoints = MODELS.parent / ".cache/training" / network
+    parser.add_argument("--work", type=pathlib.Path, default=checkpoints, help="where checkpoints go")
+    parser.add_argument("--from", dest="start", type=pathlib.Path, metavar="FILE", help="begin with these weights")
+    parser.add_argument("--out", type=pathlib.Path, default=MODELS, help=f"where {network}.onnx goes")
+    parser.add_argument("--version", default="1", help="the manifest's version")
+    parser.add_argument("--smoke", action="store_true", help="20 steps on noise, written to a temporary folder")
+    args = parser.parse_args()
+    if args.smoke:
+        args.work = args.out = pathlib.Path(tempfile.mkdtemp(prefix=f"{network}-smoke-"))
+    elif not args.data:
+        parser.error(f"expected --data DIR (from {data}) or --smoke, found neither")
+    return args
+
+
+def command():
+    """This command, as a manifest keeps it."""
+    return "models/training/" + shlex.join([pathlib.Path(sys.argv[0]).name, *sys.argv[1:]])
 
 
 class Run:

@@ -1,12 +1,7 @@
 #!/usr/bin/python3
 """Trains organ2d: see README.md beside this file."""
 
-import argparse
 import os
-import pathlib
-import shlex
-import sys
-import tempfile
 
 # One thread: PyTorch's own threads wait actively and take the machine from everyone else.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -19,26 +14,11 @@ import export2d
 from images import IGNORED, LOG_FAR, LOG_NEAR, SHAPES, Folder, Randomised, tensors
 from losses import Figures, camera_loss, depth_loss, dist_loss, semantic_loss
 from network import CLASSES, Organ2d
-from run import Run
+from run import Run, arguments, command
 
 BATCH = 8
 LEARNING_RATE = 2e-3
 DEPTH_WEIGHT = 3.0
-MODELS = pathlib.Path(__file__).resolve().parent.parent
-CHECKPOINTS = MODELS.parent / ".cache/training/organ2d"
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description="Trains organ2d and writes organ2d.onnx, its manifest and its pins.")
-    parser.add_argument("--data", action="append", default=[], metavar="DIR", help="of `demeter synth images`")
-    parser.add_argument("--minutes", type=float, default=55.0, help="time for this run, over all its restarts")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--work", type=pathlib.Path, default=CHECKPOINTS, help="where checkpoints go")
-    parser.add_argument("--from", dest="start", type=pathlib.Path, metavar="FILE", help="begin with these weights")
-    parser.add_argument("--out", type=pathlib.Path, default=MODELS, help="where organ2d.onnx goes")
-    parser.add_argument("--version", default="1", help="the manifest's version")
-    parser.add_argument("--smoke", action="store_true", help="20 steps on noise, written to a temporary folder")
-    return parser.parse_args()
 
 
 class Noise(torch.utils.data.Dataset):
@@ -83,12 +63,8 @@ def judge(network, folders):
 
 
 def main():
-    args = arguments()
+    args = arguments("organ2d", "`demeter synth images`")
     torch.set_num_threads(1)
-    if args.smoke:
-        args.work = args.out = pathlib.Path(tempfile.mkdtemp(prefix="organ2d-smoke-"))
-    elif not args.data:
-        sys.exit("train_organ2d: expected --data DIR (from `demeter synth images`) or --smoke, found neither")
     folders = [Folder(path) for path in args.data]
     endless = 1 << 40
 
@@ -107,7 +83,7 @@ def main():
         run.train(batches, lambda batch: [losses(run.network, batch)], args.minutes, most_steps, checkpoint)
     network = run.average.to(memory_format=torch.contiguous_format)
     provenance = {
-        "command": "models/training/" + shlex.join([pathlib.Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "command": command(),
         "seed": args.seed,
         "steps": run.earlier_steps + run.step,
         "program": f"train_organ2d.py, PyTorch {torch.__version__}, NumPy {np.__version__}",

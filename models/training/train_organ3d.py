@@ -1,13 +1,8 @@
 #!/usr/bin/python3
 """Trains organ3d: see README.md beside this file."""
 
-import argparse
 import copy
 import os
-import pathlib
-import shlex
-import sys
-import tempfile
 
 # One thread: PyTorch's own threads wait actively and take the machine from everyone else.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -21,7 +16,7 @@ from torch.nn import functional as F
 import clouds
 import export3d
 from network3d import CLASSES, Organ3d
-from run import Run
+from run import Run, arguments, command
 
 BATCH = 2
 LEARNING_RATE = 2e-3
@@ -30,21 +25,6 @@ CLASS_WEIGHTS = torch.tensor([1.0, 2.0, 1.5])
 BOUNDARY_WEIGHT = 2.0
 # How often each held-out plant is scanned anew to judge the network.
 JUDGED_SCANS = 4
-MODELS = pathlib.Path(__file__).resolve().parent.parent
-CHECKPOINTS = MODELS.parent / ".cache/training/organ3d"
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description="Trains organ3d and writes organ3d.onnx, its manifest and its pins.")
-    parser.add_argument("--data", action="append", default=[], metavar="DIR", help="of flock.py or `demeter synth clouds`")
-    parser.add_argument("--minutes", type=float, default=55.0, help="time for this run, over all its restarts")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--work", type=pathlib.Path, default=CHECKPOINTS, help="where checkpoints go")
-    parser.add_argument("--from", dest="start", type=pathlib.Path, metavar="FILE", help="begin with these weights")
-    parser.add_argument("--out", type=pathlib.Path, default=MODELS, help="where organ3d.onnx goes")
-    parser.add_argument("--version", default="1", help="the manifest's version")
-    parser.add_argument("--smoke", action="store_true", help="20 steps on noise, written to a temporary folder")
-    return parser.parse_args()
 
 
 class Noise(torch.utils.data.Dataset):
@@ -108,13 +88,9 @@ def figures(confusion):
 
 
 def main():
-    args = arguments()
+    args = arguments("organ3d", "tools/training-clouds.sh")
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)
-    if args.smoke:
-        args.work = args.out = pathlib.Path(tempfile.mkdtemp(prefix="organ3d-smoke-"))
-    elif not args.data:
-        sys.exit("train_organ3d: expected --data DIR (of tools/helios/flock.py) or --smoke, found neither")
     args.work.mkdir(parents=True, exist_ok=True)
     folders = [clouds.Clouds(path, args.work / "clouds") for path in args.data]
     run = Run(Organ3d(), LEARNING_RATE, args.start)
@@ -129,7 +105,7 @@ def main():
         run.train(batches, learn, args.minutes, 20 if args.smoke else 1 << 40, checkpoint)
     network = unweighted(run.average)
     provenance = {
-        "command": "models/training/" + shlex.join([pathlib.Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "command": command(),
         "seed": args.seed,
         "steps": run.earlier_steps + run.step,
         "program": f"train_organ3d.py, PyTorch {torch.__version__}, NumPy {np.__version__}, SciPy {scipy.__version__}",
