@@ -13,7 +13,7 @@ WIDTHS = (24, 48, 64, 96)
 CLASSES = 4
 # Where the plane's inverse depth falls below about 1 / INVERSE_SHARP it bends to INVERSE_LEAST: beyond the horizon no
 # depth is negative. Units are whatever the network chooses, with 1 in the picture's middle at the start. Guesses.
-INVERSE_SHARP, INVERSE_LEAST = 60.0, 0.005
+INVERSE_SHARP, INVERSE_LEAST = 20.0, 0.02
 
 
 def convolution(inputs, outputs, stride=1, dilation=1):
@@ -116,12 +116,9 @@ class Organ2d(nn.Module):
         for up, skip in zip(reversed(self.up), reversed(seen[1:-1])):
             x = up(x, skip)
         x = self.head(x)
-        # The inverse depth of a plane is linear in the picture; the head is left what stands on it and nothing else, or it
-        # would paint its doubts on the ground.
+        # The inverse depth of a plane is linear in the picture; what stands on it is left to the head.
         inverse = plane[:, :1, None, None] + (plane[:, 1:, None, None] * places(x)).sum(1, keepdim=True)
         ground = -torch.log(F.softplus(INVERSE_SHARP * inverse) / INVERSE_SHARP + INVERSE_LEAST)
         sem, dist, depth = x.split((4 * CLASSES, 4, 4), 1)
-        background, *organs = sem.detach().split(4, 1)
-        stands = torch.sigmoid(torch.maximum(torch.maximum(organs[0], organs[1]), organs[2]) - background)
-        sem, dist, depth = (F.pixel_shuffle(part, 2) for part in (sem, dist, stands * depth.float() + ground))
+        sem, dist, depth = (F.pixel_shuffle(part, 2) for part in (sem, dist, depth.float() + ground))
         return sem, torch.sigmoid(dist), depth, camera

@@ -18,7 +18,6 @@ from run import Run, arguments, command
 
 BATCH = 8
 LEARNING_RATE = 2e-3
-DEPTH_WEIGHT = 3.0
 
 
 class Noise(torch.utils.data.Dataset):
@@ -41,12 +40,12 @@ class Noise(torch.utils.data.Dataset):
 
 
 def losses(network, batch):
-    """The four losses; depth counts for more, because its is the smallest number (a guess)."""
+    """The four losses, weighed equally."""
     image, sem, dist, log_depth, known, camera = batch
     with torch.cpu.amp.autocast():
         outputs = network(image.to(memory_format=torch.channels_last))
     logits, found_dist, found_depth, found_camera = (output.float() for output in outputs)
-    depth = DEPTH_WEIGHT * depth_loss(found_depth, log_depth, known, sem)
+    depth = depth_loss(found_depth, log_depth, known, sem)
     return [semantic_loss(logits, sem), dist_loss(found_dist, dist, sem), depth, camera_loss(found_camera, camera)]
 
 
