@@ -19,7 +19,8 @@ const FROM_BELOW: f64 = 0.1;
 /// shorter ones are its wavy edge (guesses).
 const OWN_WIDTHS: f64 = 4.0;
 const OWN_SHARE: f64 = 0.035;
-/// Lines that no blade took are blades whose tips lie on others when they are this share of the plant's size (a guess).
+/// Lines from the stem that no blade took are blades whose tips lie on others when they are this share of the plant's
+/// size (a guess).
 const LEFT_OVER: f64 = 0.07;
 
 /// A line in the picture with the half width of what it is the middle of, pixels.
@@ -178,7 +179,9 @@ impl Plant {
             if taken[line] || self.network.lines[line].length < LEFT_OVER * self.size {
                 continue;
             }
-            let ways = [0, 1].into_iter().filter_map(|end| ways.from((line, end)));
+            // From blade to blade go crossings and holes: a blade comes from the stem on a way of its own.
+            let is_own = |way: &Vec<Walk>| way.iter().all(|walk| !taken[walk.0]);
+            let ways = [0, 1].into_iter().filter_map(|end| ways.from((line, end))).filter(is_own);
             if let Some(way) = ways.min_by(|a, b| length(a).total_cmp(&length(b))) {
                 way.iter().for_each(|walk| taken[walk.0] = true);
                 blades.push(way);
@@ -304,7 +307,7 @@ mod tests {
     }
 
     /// An upright stem with strap leaves: (height of the node, reach to the right, rise, fall of the tip below its top).
-    fn maize(leaves: &[(f64, f64, f64, f64)]) -> (Silhouette, Vec<f64>) {
+    fn maize(leaves: &[(f64, f64, f64, f64)]) -> (GrayImage, Vec<f64>) {
         let mut picture = GrayImage::new(400, 440);
         let foot = DVec2::new(200.0, 420.0);
         let top = leaves.iter().map(|leaf| leaf.0).fold(0.0, f64::max);
@@ -317,7 +320,7 @@ mod tests {
             let at = |t: f64| curve[0].lerp(curve[1], t).lerp(curve[1].lerp(curve[2], t), t);
             lengths.push((0..100).map(|k| at(f64::from(k) / 100.0).distance(at(f64::from(k + 1) / 100.0))).sum());
         }
-        (Silhouette::of(&picture), lengths)
+        (picture, lengths)
     }
 
     fn length(stroke: &Stroke) -> f64 {
@@ -327,14 +330,14 @@ mod tests {
 
     #[test]
     fn leaves_are_counted_and_measured_lowest_first() {
-        let (shape, lengths) = maize(&[
+        let (picture, lengths) = maize(&[
             (80.0, 120.0, 60.0, 40.0),
             (140.0, -130.0, 70.0, 60.0),
             (200.0, 110.0, 70.0, 20.0),
             (260.0, -60.0, 100.0, 0.0),
             (262.0, 40.0, 120.0, 0.0),
         ]);
-        let sketch = Sketch::of(&shape).unwrap();
+        let sketch = Sketch::of(&Silhouette::of(&picture)).unwrap();
         assert_eq!(sketch.blades.len(), lengths.len());
         assert!((sketch.stem.points[0].x - 200.0).abs() < 5.0 && sketch.stem.points[0].y > 400.0);
         for (blade, expected) in sketch.blades.iter().zip(&lengths).take(3) {
@@ -346,18 +349,35 @@ mod tests {
     #[test]
     fn blades_go_straight_over_crossings() {
         // The lower leaf's arch is crossed by the hanging tip of the upper one, well off the stem.
-        let (shape, lengths) = maize(&[
+        let (picture, lengths) = maize(&[
             (60.0, 160.0, 110.0, 60.0),
             (200.0, 160.0, 10.0, 160.0),
             (240.0, -60.0, 100.0, 0.0),
             (242.0, 40.0, 120.0, 0.0),
         ]);
-        let sketch = Sketch::of(&shape).unwrap();
+        let sketch = Sketch::of(&Silhouette::of(&picture)).unwrap();
         assert_eq!(sketch.blades.len(), 4);
         let found: Vec<f64> = sketch.blades.iter().map(length).collect();
         for (found, expected) in found.iter().zip(&lengths).take(2) {
             assert!((found / expected - 1.0).abs() < 0.12, "{found} instead of {expected}");
         }
+    }
+
+    #[test]
+    fn holes_between_blades_add_none() {
+        let leaves = [
+            (80.0, 120.0, 60.0, 40.0),
+            (140.0, -130.0, 70.0, 60.0),
+            (200.0, 160.0, 60.0, 40.0),
+            (260.0, -60.0, 100.0, 0.0),
+            (262.0, 40.0, 120.0, 0.0),
+        ];
+        let (mut picture, lengths) = maize(&leaves);
+        // From a blade's rise to its fall.
+        let ends = [DVec2::new(248.0, 168.0), DVec2::new(328.0, 169.0)];
+        stroke(&mut picture, [ends[0], ends[0].midpoint(ends[1]), ends[1]], 3.0, 0.0);
+        let sketch = Sketch::of(&Silhouette::of(&picture)).unwrap();
+        assert_eq!(sketch.blades.len(), lengths.len());
     }
 
     #[test]
