@@ -62,8 +62,8 @@ pub enum GroupError {
     /// A scrap of main stem.
     #[error("expected a main stem of about the size of the others in the picture, found a scrap")]
     Scrap,
-    /// One leaf that hangs on nothing, in a picture that shows the main stems of others.
-    #[error("expected a main stem or at least two organs, as stems are in view, found one organ")]
+    /// No main stem, and too little to say where it would be.
+    #[error("expected a main stem or at least two organs, found one organ")]
     NoMainStem,
 }
 
@@ -80,8 +80,7 @@ pub struct Refused {
 ///
 /// A minimum spanning forest rooted at the main stems: again and again the organ with the smallest gap to a plant's
 /// stems joins it (leaves carry nothing). What reaches no main stem forms plants of its own, whose stem is its lowest
-/// stem or a stand-in through the leaves' bases. A single leaf is such a plant only in a picture without any main stem:
-/// from above young plants hide theirs and are often one patch, but where stems are seen it is a piece of one of them.
+/// stem or a stand-in through the leaves' bases.
 #[must_use]
 pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Refused>) {
     let up = super::scale::up(view);
@@ -107,7 +106,7 @@ pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Re
         let instances = ids(&members);
         if leaves == 0 {
             refused.push(Refused { instances, reason: GroupError::NoLeaf });
-        } else if rooted > 0 && i >= rooted && members.len() < 2 {
+        } else if i >= rooted && members.len() < 2 {
             refused.push(Refused { instances, reason: GroupError::NoMainStem });
         } else {
             views.push(plant(view, organs, &members, instances, up));

@@ -181,33 +181,6 @@ fn a_rosette_gets_a_stand_in_stem_between_its_leaves() {
     });
 }
 
-/// Young plants from above: a rosette and a plant of one patch, apart. With a main stem in view the patch is a piece.
-#[test]
-fn from_above_each_group_of_leaves_is_a_plant_that_stands_among_them() {
-    use Semantic::{Leaf, MainStem};
-    let above = || {
-        let rosette = Scene::new().rectangle(Leaf, [20, 150, 58, 164], 1.0).rectangle(Leaf, [62, 150, 100, 164], 1.0);
-        rosette.rectangle(Leaf, [240, 150, 280, 170], 1.0)
-    };
-    let found = |scene: Scene| {
-        scene.with(None, |view| {
-            let (raster, regions) = instances(view);
-            let lifted = lift(view, &raster, &regions, nominal(view).unwrap());
-            let (plants, refused) = group(view, &lifted.organs);
-            let column = |plant: &PlantView| view.intrinsics.project(plant.base).unwrap().x;
-            let mut stand_ins: Vec<f64> = plants.iter().filter(|plant| plant.stand_in).map(column).collect();
-            stand_ins.sort_by(f64::total_cmp);
-            (stand_ins, plants.len(), refused.into_iter().map(|r| r.reason).collect::<Vec<_>>())
-        })
-    };
-    let (columns, plants, refused) = found(above());
-    assert_eq!((columns.len(), plants, refused), (2, 2, vec![]));
-    assert!((columns[0] - 60.0).abs() < 5.0 && (240.0..=280.0).contains(&columns[1]), "{columns:?}");
-    let beside = above().rectangle(MainStem, [160, 40, 164, 80], 1.0).rectangle(Leaf, [164, 40, 190, 52], 1.0);
-    let (columns, plants, refused) = found(beside);
-    assert_eq!((columns.len(), plants, refused), (1, 2, vec![GroupError::NoMainStem]));
-}
-
 #[test]
 fn depth_edges_and_specks_are_dropped_and_counted() {
     let mut scene = Scene::new().rectangle(Semantic::Leaf, [60, 100, 120, 130], 1.0).rectangle(
