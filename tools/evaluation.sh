@@ -19,8 +19,9 @@ page=$(mktemp)
 # Evaluation
 
 Made by \`make evaluation\` at commit $(git log -1 --format=%h$(git diff --quiet HEAD || echo +changes)), step ${every} through the clouds and plants of each set; definitions are in
-spec/reconstruction.md "Metrics", goals in issues 3 and 4. Nothing was learned from the shared data that
-are for evaluation only; where rules were chosen with them in view, the notes say so. The program is built with the dev profile (opt-level 3), as everywhere.
+spec/reconstruction.md "Metrics", goals in issues 3 and 4. Nothing was learned from shared data that are
+for evaluation only; where rules were chosen with them in view, the notes say so. The program is built with the dev profile
+(opt-level 3), as everywhere.
 
 ## Whole plants
 

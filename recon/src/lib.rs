@@ -8,6 +8,7 @@
 mod axes;
 pub mod baseline;
 pub mod cloud;
+mod distance;
 pub mod edit;
 pub mod export;
 pub mod fit;

@@ -40,9 +40,10 @@ pub enum PyramidError {
 
 /// The pyramid of `points` (metres or any unit, z up); time and memory are linear in their number.
 ///
-/// Level 0 has cubic cells of half the edge of level 1, level 2 of twice and level 3 of four times it (or eight, or more, until at most 512 are filled); a filled cell's
-/// point is the mean of the points below that it holds. The cells of level 1 are the smallest that leave at most 4,096
-/// filled, so that neither the number of points nor their density changes what the network sees, but not smaller than
+/// Level 0 has cubic cells of half the edge of level 1, level 2 of twice and level 3 of four times it (or eight, or more,
+/// until at most 512 are filled); a filled cell's point is the mean of the points below that it holds. The cells of level
+/// 1 are the smallest that leave at most 4,096 filled, so that neither the number of points nor their density changes what
+/// the network sees, but not smaller than
 /// 0.4 % of the cloud's diagonal.
 ///
 /// # Errors

@@ -4,6 +4,8 @@ use glam::DVec2;
 use image::GrayImage;
 
 use super::outline::{Ends, OutlineError};
+use crate::distance::distances;
+use crate::graph::pieces;
 
 /// A pixel above this grey is leaf; masks are black and white, so any middle will do.
 const LEAF_ABOVE: u8 = 127;
@@ -110,19 +112,11 @@ impl Region {
         found
     }
 
-    /// The largest connected part.
+    /// The largest connected part, of several the first.
     fn largest(&self) -> Self {
-        let mut seen = vec![false; self.inside.len()];
-        let mut largest = Vec::new();
-        for p in 0..self.inside.len() {
-            if self.inside[p] && !seen[p] {
-                let part = self.flood(p, &mut seen);
-                if part.len() > largest.len() {
-                    largest = part;
-                }
-            }
-        }
-        self.with_pixels(&largest)
+        let parts = pieces(self.inside.len(), |p| self.beside(p), |p| self.inside[p]);
+        // The last of equal ones is the maximum: the first, backwards.
+        self.with_pixels(&parts.into_iter().rev().max_by_key(Vec::len).unwrap_or_default())
     }
 
     fn with_pixels(&self, pixels: &[usize]) -> Self {
@@ -149,10 +143,10 @@ impl Region {
     /// The pixels of the petiole: the longest of the parts that a morphological opening takes away, if it is long
     /// enough and at the given end.
     fn petiole(&self, ends: Ends) -> Option<Self> {
-        // Beyond the picture there is no leaf, hence the rim of one pixel in `distance`.
-        let depth = distance(self.width, self.height, |p| !self.inside[p], true);
+        // Beyond the picture there is no leaf, hence the rim.
+        let depth = distances(self.width, self.height, |p| !self.inside[p], true);
         let radius = PETIOLE_SHARE * depth.iter().copied().fold(0.0, f64::max);
-        let reach = distance(self.width, self.height, |p| depth[p] > radius, false);
+        let reach = distances(self.width, self.height, |p| depth[p] > radius, false);
         let residue = self.with((0..self.inside.len()).map(|p| self.inside[p] && reach[p] > radius).collect());
         let along = |p: usize| ends.along((p % self.width) as f64, (p / self.width) as f64);
         let inside = (0..self.inside.len()).filter(|p| self.inside[*p]);
@@ -175,52 +169,4 @@ impl Region {
         });
         (blade, (count > 0.0).then(|| sum / count))
     }
-}
-
-/// Distance in pixels from every pixel to the nearest one that `is`, exactly (Felzenszwalb and Huttenlocher, "Distance
-/// Transforms of Sampled Functions", 2012); with `rim`, all pixels beyond the picture are such too.
-fn distance(width: usize, height: usize, is: impl Fn(usize) -> bool, rim: bool) -> Vec<f64> {
-    let far = (width * width + height * height) as f64;
-    let mut squared: Vec<f64> = (0..width * height).map(|p| if is(p) { 0.0 } else { far }).collect();
-    let mut line = Vec::new();
-    let mut pass = |start: usize, step: usize, count: usize| {
-        line.clear();
-        line.extend((0..count).map(|k| squared[start + k * step]));
-        for (k, d) in lower_envelope(&line).into_iter().enumerate() {
-            let edge = if rim { (k + 1).min(count - k) } else { usize::MAX } as f64;
-            squared[start + k * step] = d.min(edge * edge);
-        }
-    };
-    (0..width).for_each(|x| pass(x, width, height));
-    (0..height).for_each(|y| pass(y * width, 1, width));
-    squared.into_iter().map(f64::sqrt).collect()
-}
-
-/// min over q of (p - q)² + f(q), for every p.
-fn lower_envelope(f: &[f64]) -> Vec<f64> {
-    // The parabolas on the envelope: where each is rooted and from where on it is lowest.
-    let mut envelope: Vec<(usize, f64)> = Vec::new();
-    for q in 0..f.len() {
-        let mut from = f64::NEG_INFINITY;
-        while let Some((root, start)) = envelope.last().copied() {
-            let (a, b) = (q as f64, root as f64);
-            from = ((f[q] + a * a) - (f[root] + b * b)) / (2.0 * (a - b));
-            if from > start {
-                break;
-            }
-            envelope.pop();
-            from = f64::NEG_INFINITY;
-        }
-        envelope.push((q, from));
-    }
-    let mut k = 0;
-    (0..f.len())
-        .map(|p| {
-            while envelope.get(k + 1).is_some_and(|(_, start)| *start < p as f64) {
-                k += 1;
-            }
-            let root = envelope[k].0;
-            (p as f64 - root as f64).powi(2) + f[root]
-        })
-        .collect()
 }

@@ -2,6 +2,8 @@
 
 use image::GrayImage;
 
+use crate::graph::pieces;
+
 /// Connected pixels of a mask.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Patch {
@@ -15,28 +17,20 @@ pub struct Patch {
 #[must_use]
 pub fn patches(mask: &GrayImage) -> Vec<Patch> {
     let (width, height) = (mask.width() as usize, mask.height() as usize);
-    let mut left: Vec<bool> = mask.as_raw().iter().map(|&v| v > 0).collect();
-    let mut patches = Vec::new();
-    for start in 0..left.len() {
-        if !std::mem::replace(&mut left[start], false) {
-            continue;
-        }
-        let mut pixels = vec![start];
-        let mut bounds = [u32::MAX, u32::MAX, 0, 0];
-        let mut next = 0;
-        while let Some(&p) = pixels.get(next) {
-            let (x, y) = (p % width, p / width);
-            let [x0, y0, x1, y1] = bounds;
-            bounds = [x0.min(x as u32), y0.min(y as u32), x1.max(x as u32 + 1), y1.max(y as u32 + 1)];
-            for j in y.saturating_sub(1)..(y + 2).min(height) {
-                let beside = x.saturating_sub(1)..(x + 2).min(width);
-                pixels.extend(beside.map(|i| j * width + i).filter(|&q| std::mem::replace(&mut left[q], false)));
-            }
-            next += 1;
-        }
-        patches.push(Patch { pixels, bounds });
-    }
-    patches
+    let around = |p: usize| {
+        let (x, y) = (p % width, p / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        rows.flat_map(move |j| (x.saturating_sub(1)..(x + 2).min(width)).map(move |i| j * width + i))
+    };
+    let patch = |pixels: Vec<usize>| {
+        let grown = |[x0, y0, x1, y1]: [u32; 4], &p: &usize| {
+            let (x, y) = ((p % width) as u32, (p / width) as u32);
+            [x0.min(x), y0.min(y), x1.max(x + 1), y1.max(y + 1)]
+        };
+        let bounds = pixels.iter().fold([u32::MAX, u32::MAX, 0, 0], grown);
+        Patch { pixels, bounds }
+    };
+    pieces(width * height, around, |p| mask.as_raw()[p] > 0).into_iter().map(patch).collect()
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::silhouette::Silhouette;
+use crate::graph::pieces;
 use crate::nearest::Nearest;
 
 /// Side lines shorter than this many radii of the shape at their joint come of its raggedness (a guess: a blade's tip
@@ -173,24 +174,7 @@ impl Thin {
 
     /// Connected parts, largest first.
     fn parts(&self) -> Vec<Vec<usize>> {
-        let mut seen = vec![false; self.inside.len()];
-        let mut parts = Vec::new();
-        for start in (0..seen.len()).filter(|&p| self.inside[p]) {
-            if std::mem::replace(&mut seen[start], true) {
-                continue;
-            }
-            let mut part = vec![start];
-            let mut next = 0;
-            while next < part.len() {
-                for q in self.shape.ring(part[next]).into_iter().filter(|&q| self.inside[q]) {
-                    if !std::mem::replace(&mut seen[q], true) {
-                        part.push(q);
-                    }
-                }
-                next += 1;
-            }
-            parts.push(part);
-        }
+        let mut parts = pieces(self.inside.len(), |p| self.shape.ring(p).into_iter(), |p| self.inside[p]);
         parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
         parts
     }

@@ -2,6 +2,8 @@
 
 use image::GrayImage;
 
+use crate::distance::distances;
+
 /// Which pixels of a picture show a plant.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Silhouette {
@@ -48,26 +50,11 @@ impl Silhouette {
         [p - w, p - w + 1, p + 1, p + w + 1, p + w, p + w - 1, p - 1, p - w - 1]
     }
 
-    /// Distance from the centre of each pixel inside to that of the nearest one outside, 0 outside: exact (Felzenszwalb
-    /// and Huttenlocher, "Distance Transforms of Sampled Functions", 2012).
+    /// Distance from the centre of each pixel inside to that of the nearest one outside, 0 outside, pixels.
     #[must_use]
     pub fn radii(&self) -> Vec<f32> {
-        let (w, h) = (self.width, self.height);
-        // Larger than any square of a distance here, small enough that sums of two are exact.
-        let far = ((w + h) * (w + h)) as f64;
-        let mut squares: Vec<f64> = self.inside.iter().map(|&inside| if inside { far } else { 0.0 }).collect();
-        let mut line = Vec::new();
-        for x in 0..w {
-            line.clear();
-            line.extend((0..h).map(|y| squares[y * w + x]));
-            for (y, square) in lower_envelope(&line).into_iter().enumerate() {
-                squares[y * w + x] = square;
-            }
-        }
-        for row in squares.chunks_exact_mut(w.max(1)) {
-            row.copy_from_slice(&lower_envelope(row));
-        }
-        squares.into_iter().map(|square| square.sqrt() as f32).collect()
+        let found = distances(self.width, self.height, |p| !self.inside[p], false);
+        found.into_iter().map(|distance| distance as f32).collect()
     }
 
     /// Lines one pixel wide that keep the shape's ends, joints and holes (Guo and Hall, "Parallel Thinning with
@@ -99,36 +86,10 @@ impl Silhouette {
     }
 }
 
-/// The least of f(q) + (p - q)² over q, for every p.
-fn lower_envelope(f: &[f64]) -> Vec<f64> {
-    // Parabolas of the envelope, and where each begins to be the lowest.
-    let mut hull: Vec<(usize, f64)> = Vec::new();
-    for q in 0..f.len() {
-        let meets = |r: usize| ((f[q] + (q * q) as f64) - (f[r] + (r * r) as f64)) / (2.0 * (q - r) as f64);
-        while let Some(&(r, begins)) = hull.last() {
-            if meets(r) > begins {
-                break;
-            }
-            hull.pop();
-        }
-        let begins = hull.last().map_or(f64::NEG_INFINITY, |&(r, _)| meets(r));
-        hull.push((q, begins));
-    }
-    let mut k = 0;
-    (0..f.len())
-        .map(|p| {
-            while hull.get(k + 1).is_some_and(|&(_, begins)| begins < p as f64) {
-                k += 1;
-            }
-            let q = hull[k].0;
-            f[q] + (p.abs_diff(q) * p.abs_diff(q)) as f64
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::graph::pieces;
     use proptest::prelude::*;
     use rand::Rng;
 
@@ -147,23 +108,9 @@ mod tests {
         Silhouette::of(&picture)
     }
 
-    /// Connected parts of the pixels that are `inside`, over all eight neighbours.
+    /// How many parts the pixels inside form, over all eight neighbours.
     fn parts(shape: &Silhouette) -> usize {
-        let mut seen = vec![false; shape.inside.len()];
-        let mut count = 0;
-        for start in 0..seen.len() {
-            if !shape.inside[start] || seen[start] {
-                continue;
-            }
-            count += 1;
-            let mut stack = vec![start];
-            while let Some(p) = stack.pop() {
-                if !std::mem::replace(&mut seen[p], true) {
-                    stack.extend(shape.ring(p).into_iter().filter(|&q| shape.inside[q]));
-                }
-            }
-        }
-        count
+        pieces(shape.inside.len(), |p| shape.ring(p).into_iter(), |p| shape.inside[p]).len()
     }
 
     proptest! {
