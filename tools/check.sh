@@ -16,6 +16,7 @@ step() {
 
 step "setup" tools/setup.sh
 step "cargo tools" tools/cargo-tools.sh
+step "camera lab" tools/camera-lab.sh
 step "format" cargo fmt --all --check
 step "dependency rules" cargo deny --log-level error check bans licenses sources
 step "clippy" cargo clippy --locked --workspace --all-targets -- -D warnings

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+pub mod lab;
+
 /// The project's root folder.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -37,14 +39,19 @@ pub fn schema() -> jsonschema::Validator {
 }
 
 /// The program, as built beside these tests.
+pub fn demeter() -> std::process::Command {
+    std::process::Command::new(demeter_path())
+}
+
+/// The program's file.
 ///
 /// # Panics
 /// When it is not there: a workspace build makes it, a build of this crate alone does not.
-pub fn demeter() -> std::process::Command {
+pub fn demeter_path() -> PathBuf {
     let tests = std::env::current_exe().expect("a test runs from a file");
     let program = tests.ancestors().nth(2).expect("tests stand in target/PROFILE/deps").join("demeter");
     assert!(program.is_file(), "{} does not exist: run `cargo build -p demeter`", program.display());
-    std::process::Command::new(program)
+    program
 }
 
 /// Runs the program with --json; its exit code and its answer, checked against the contract.
