@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use demeter_frame::{Intrinsics, Mask, Pose, Rgb};
-use demeter_models::{CameraGuess, ModelError, RuntimeError};
+use demeter_models::{ModelError, OrganMaps, RuntimeError};
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::view::{self, DepthScale, Dropped, PlantView, Refused, ScaleError, View, ViewError};
 use glam::DVec2;
@@ -129,12 +129,12 @@ impl Eye {
         &self.networks.degraded
     }
 
-    /// The camera, as far as a picture tells it.
+    /// What our network says of a picture, the camera among it.
     ///
     /// # Errors
     /// [`SightError::Network`] when the network fails.
-    pub fn camera(&mut self, picture: &Rgb) -> Result<CameraGuess, SightError> {
-        self.networks.camera(picture)
+    pub fn maps(&mut self, picture: &Rgb) -> Result<OrganMaps, SightError> {
+        Ok(self.networks.maps(picture)?)
     }
 
     /// The probability that each pixel shows a plant, at the network's size.
@@ -142,7 +142,9 @@ impl Eye {
     /// # Errors
     /// [`SightError::Network`] when the network fails.
     pub fn plants(&mut self, picture: &Rgb) -> Result<Mask, SightError> {
-        Ok(self.networks.plants(picture)?)
+        let [mut plant, ..] = self.maps(picture)?.probabilities;
+        plant.iter_mut().for_each(|p| *p = 1.0 - *p);
+        Ok(plant)
     }
 
     /// Looks at a picture. With a place in the world the ground gives metres; without one the plants are put at 1 m.
@@ -155,8 +157,23 @@ impl Eye {
         camera: &Intrinsics,
         world_from_camera: Option<Pose>,
     ) -> Result<Sight, SightError> {
+        let maps = self.maps(picture)?;
+        self.look_with(picture, maps, camera, world_from_camera)
+    }
+
+    /// [`Eye::look`] for a picture of which our network has spoken.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn look_with(
+        &mut self,
+        picture: &Rgb,
+        maps: OrganMaps,
+        camera: &Intrinsics,
+        world_from_camera: Option<Pose>,
+    ) -> Result<Sight, SightError> {
         let Scene { semantic, dist, log_depth, divided, metric, scale: enlargement, degraded } =
-            self.networks.look(picture, camera)?;
+            self.networks.scene(picture, maps, camera)?;
         let (width, height) = semantic.dimensions();
         let view = View {
             semantic: &semantic,

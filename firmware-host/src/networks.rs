@@ -6,8 +6,7 @@ use std::num::NonZeroUsize;
 
 use demeter_frame::{Depth, Instances, Intrinsics, Mask, Rgb, Semantic};
 use demeter_models::{
-    CameraGuess, DepthMap, DepthNetwork, Instance, Model, ModelError, Organ2d, OrganMaps, OrganNetwork, Runtime,
-    find_manifest,
+    DepthMap, DepthNetwork, Instance, Model, ModelError, Organ2d, OrganMaps, OrganNetwork, Runtime, find_manifest,
 };
 use demeter_recon::view::{self, Region, View, ViewError};
 use demeter_recon::world::boundary_distance;
@@ -17,7 +16,7 @@ use image::{GrayImage, Luma};
 use crate::config::{ModelsConfig, OURS};
 use crate::cutter::Cutter;
 use crate::error::chain;
-use crate::eye::{EyeError, SightError};
+use crate::eye::EyeError;
 use crate::raster::nearest;
 
 /// The longest side of a picture given to other people's networks, pixels: the largest that one of them works at inside,
@@ -98,21 +97,13 @@ impl Networks {
             .collect()
     }
 
-    /// The camera as ours sees it.
-    pub(crate) fn camera(&mut self, picture: &Rgb) -> Result<CameraGuess, SightError> {
-        Ok(self.ours.run(picture)?.camera)
+    /// What ours says of a picture.
+    pub(crate) fn maps(&mut self, picture: &Rgb) -> Result<OrganMaps, ModelError> {
+        self.ours.run(picture)
     }
 
-    /// The probability, by ours, that each pixel shows a plant.
-    pub(crate) fn plants(&mut self, picture: &Rgb) -> Result<Mask, ModelError> {
-        let [mut plant, ..] = self.ours.run(picture)?.probabilities;
-        plant.iter_mut().for_each(|p| *p = 1.0 - *p);
-        Ok(plant)
-    }
-
-    /// Looks at a picture. Ours must give an answer; what of the others fails is left out and said.
-    pub(crate) fn look(&mut self, picture: &Rgb, camera: &Intrinsics) -> Result<Scene, SightError> {
-        let maps = self.ours.run(picture)?;
+    /// The scene of a picture and what ours says of it; what of the others fails is left out and said.
+    pub(crate) fn scene(&mut self, picture: &Rgb, maps: OrganMaps, camera: &Intrinsics) -> Result<Scene, ViewError> {
         let semantic = maps.semantic();
         let (width, height) = semantic.dimensions();
         let mut degraded = Vec::new();

@@ -69,3 +69,28 @@ fn any_cloud_gets_an_answer_twice_the_same() {
         assert_eq!(maps, network().run(&pyramid).unwrap());
     }
 }
+
+/// Without ONNX Runtime geometry finds the organs, and the answer says so; with it, nothing is to be said.
+#[test]
+fn without_the_library_geometry_stands_in_and_a_warning_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let grown = ["synth", "clouds", "--species", "soybean", "--count", "1", "-o", &at("clouds")];
+    assert!(demeter_tests::demeter().args(grown).status().unwrap().success());
+    let cloud = std::fs::read_dir(at("clouds")).unwrap().map(|file| file.unwrap().path());
+    let cloud = cloud.filter(|path| path.extension().is_some_and(|end| end == "ply")).min().unwrap();
+    let fit = |library: &str| {
+        let output = demeter_tests::demeter()
+            .args(["fit", cloud.to_str().unwrap(), "--species", "soybean", "--labels", "none", "--json"])
+            .args(["-o", &at("plant.dmtr")])
+            .env("DEMETER_ONNXRUNTIME", library)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(answer["plants"].as_array().unwrap().len(), 1);
+        answer["warnings"].to_string()
+    };
+    assert!(fit("/nowhere/libonnxruntime.so").contains("organs were found by geometry alone"));
+    assert!(!fit("").contains("geometry"));
+}

@@ -102,7 +102,9 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let Divided { segmented, network, degraded } = Divider::new(args.organs)
         .divide(&cloud, &species, labels, up)
         .map_err(|error| args.refused("segmentation", &error))?;
-    let warnings = network.map(|name| format!("organs were found by {name}")).into_iter().chain(degraded).collect();
+    if let Some(name) = network {
+        tracing::info!("organs were found by {name}");
+    }
     let tree = tree::build(segmented.organs).map_err(|error| args.refused("topology", &error))?;
     let fitted = fit::plant(&tree, &species, segmented.up).map_err(|error| args.refused("fit", &error))?;
     let mut described = describe(&fitted, &species, &cloud.points, ScaleSource::Input, args.target.encoding())?;
@@ -113,6 +115,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     }
     described.report.ms = Some(started.elapsed().as_secs_f64() * 1e3);
     let plants = vec![described.report];
+    let warnings = degraded.into_iter().collect();
     output.plants(&Document { plants, warnings, seconds: Some(started.elapsed().as_secs_f64()) })?;
     Ok(Exit::Done)
 }

@@ -10,7 +10,7 @@ use demeter_recon::model::Species;
 
 use crate::config::{Config, ModelsConfig};
 use crate::error::{CommandError, Exit, chain};
-use crate::eye::{Eye, SightError};
+use crate::eye::{Eye, Sight, SightError};
 use crate::files;
 use crate::lens::{self, Lens};
 use crate::output::Output;
@@ -68,10 +68,8 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let config = Config::load(args.config.as_deref())?;
     let mut eye = Eye::open(&config.models, NonZeroUsize::MIN).and_then(Eye::closer)?;
     let blind = |error: SightError| CommandError::failed(error.name(), &error);
-    let Lens { camera, warning } = match told {
-        Some(lens) => lens,
-        None => lens::guessed(&photo, &eye.camera(&photo).map_err(blind)?),
-    };
+    let maps = eye.maps(&photo).map_err(blind)?;
+    let Lens { camera, warning } = told.unwrap_or_else(|| lens::guessed(&photo, &maps.camera));
     let mut warnings: Vec<String> = warning.into_iter().collect();
     warnings.extend(eye.degraded().iter().map(ToString::to_string));
     // Who brings networks of their own wants to see what those find.
@@ -79,7 +77,10 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let one = if as_silhouette { portrait::grass(&mut eye, &photo, &camera, &species) } else { Ok(None) };
     let (mut fitted, failures) = match one {
         Ok(Some(portrait)) => (vec![portrait], 0),
-        Ok(None) | Err(PortraitError::Reconstruct(_)) => all(args, &mut eye, &photo, &camera, &species, &mut warnings)?,
+        Ok(None) | Err(PortraitError::Reconstruct(_)) => {
+            let sight = eye.look_with(&photo, maps, &camera, None).map_err(blind)?;
+            all(args, sight, &camera, &species, &mut warnings)?
+        }
         Err(PortraitError::Sight(error)) => return Err(CommandError::failed(error.name(), &error)),
     };
     write(args, &mut fitted, &species, &photo, &camera)?;
@@ -89,16 +90,14 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     Ok(exit)
 }
 
-/// Every plant by its organs, the largest first, or the largest that can be fitted; and how many could not.
+/// Every plant seen, by its organs, the largest first, or the largest that can be fitted; and how many could not.
 fn all(
     args: &Args,
-    eye: &mut Eye,
-    photo: &Rgb,
+    sight: Sight,
     camera: &Intrinsics,
     species: &Species,
     warnings: &mut Vec<String>,
 ) -> Result<(Vec<Portrait>, usize), CommandError> {
-    let sight = eye.look(photo, camera, None).map_err(|error| CommandError::failed(error.name(), &error))?;
     warnings.extend(sight.degraded.iter().map(ToString::to_string));
     let (scale_source, mut seen) = (sight.scale_source, sight.plants);
     if seen.is_empty() {

@@ -19,8 +19,6 @@ const TRIAL: usize = 3;
 const STEPS: usize = 15;
 /// Standard deviation of a node in the picture, pixels: edges wave (a guess).
 const PIXELS: f64 = 1.5;
-/// Standard deviation of a node's depth, in lengths of the blade (a guess).
-const DEPTH: f64 = 0.15;
 
 /// Where a picture shows a blade, in the frame of its camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +27,8 @@ pub struct Pictured {
     pub nodes: Vec<DVec3>,
     /// Metres that a pixel spans there.
     pub pixel: f64,
+    /// Standard deviation of a node's depth, in lengths of the blade.
+    pub depth: f64,
 }
 
 /// Fits a plant to its picture, in the camera's frame: a main stem by its points, and blades whose nodes are known. `up`
@@ -129,7 +129,7 @@ impl Pins {
             nodes.chunks_exact_mut(columns).for_each(<[DVec3]>::reverse);
         }
         let length = state.metres();
-        Self { nodes, in_picture: (PIXELS * blade.pixel).powi(-2), in_depth: (DEPTH * length).powi(-2) }
+        Self { nodes, in_picture: (PIXELS * blade.pixel).powi(-2), in_depth: (blade.depth * length).powi(-2) }
     }
 
     fn minimised(&self, mut state: State, steps: usize, species: &Species) -> (State, bool) {
@@ -180,6 +180,7 @@ mod tests {
     use crate::species::shipped;
 
     const METRES: f64 = 0.4;
+    const DEPTH: f64 = 0.15;
 
     /// A bent blade of maize a metre and a half before the camera, and its nodes.
     fn blade(species: &Species) -> (State, Vec<DVec3>) {
@@ -207,7 +208,7 @@ mod tests {
         let species = shipped("maize").expect("listed").expect("valid");
         let (state, mut nodes) = blade(&species);
         nodes.iter_mut().enumerate().for_each(|(k, p)| *p += DVec3::new(0.01, -0.007, 0.02) * (k as f64).cos());
-        let pins = Pins::of(&Pictured { nodes, pixel: 0.002 }, &state, &species);
+        let pins = Pins::of(&Pictured { nodes, pixel: 0.002, depth: DEPTH }, &state, &species);
         let at = pins.normal(&state, &species);
         for k in 0..at.g.len() {
             let cost = |by: f64| {
@@ -231,7 +232,7 @@ mod tests {
             if mirrored {
                 shown.chunks_exact_mut(NODES.columns()).for_each(<[DVec3]>::reverse);
             }
-            let blades = [Pictured { nodes: shown, pixel }];
+            let blades = [Pictured { nodes: shown, pixel, depth: DEPTH }];
             let fitted = pictured(&stem(state.base), &blades, &species, DVec3::NEG_Y).unwrap();
             assert_eq!(fitted.plant.organs[1].kind(), OrganKind::Leaf);
             let posed = crate::model::forward(&fitted.plant, &species).unwrap();
@@ -254,7 +255,13 @@ mod tests {
         let (_, nodes) = blade(&species);
         for stem in [vec![], vec![DVec3::Z; 9], vec![DVec3::NAN; 9]] {
             assert!(
-                pictured(&stem, &[Pictured { nodes: nodes.clone(), pixel: 0.002 }], &species, DVec3::NEG_Y).is_err()
+                pictured(
+                    &stem,
+                    &[Pictured { nodes: nodes.clone(), pixel: 0.002, depth: DEPTH }],
+                    &species,
+                    DVec3::NEG_Y
+                )
+                .is_err()
             );
         }
     }

@@ -12,6 +12,8 @@ const EDGES: [f64; 2] = [0.01, 0.99];
 const END: f64 = 0.995;
 /// Fewest pixels across which edges can be told.
 const MIN_PIXELS: usize = 3;
+/// Standard deviation of a node's depth by a network, in lengths of the blade (a guess).
+const DEPTH: f64 = 0.15;
 
 /// The nodes of the blade that an organ's points are of, in the camera's frame where `base` is too, its axis from the
 /// base to the middle of its far end. Depth is the plane through the points. `None` where the base or the points are no
@@ -53,7 +55,7 @@ pub fn shown(organ: &OrganCloud, base: DVec3, camera: &Intrinsics) -> Option<Pic
         }
     }
     let pixel = base.z / camera.fx;
-    (pixel > 0.0 && nodes.iter().all(|p| p.is_finite() && p.z > 0.0)).then_some(Pictured { nodes, pixel })
+    (pixel > 0.0 && nodes.iter().all(|p| p.is_finite() && p.z > 0.0)).then_some(Pictured { nodes, pixel, depth: DEPTH })
 }
 
 /// Depth as a linear function of the picture's coordinates, kept between the depths it was made of.

@@ -114,8 +114,8 @@ impl Run<'_> {
         let camera = match lens::of(&rgb, &bytes, turned, None, None)? {
             Some(lens) => lens.camera,
             None => {
-                let guess = eye.camera(&rgb).map_err(|error| CommandError::failed(error.name(), &error).of(path))?;
-                lens::guessed(&rgb, &guess).camera
+                let maps = eye.maps(&rgb).map_err(|error| CommandError::failed(error.name(), &error).of(path))?;
+                lens::guessed(&rgb, &maps.camera).camera
             }
         };
         Ok(Photo { path: path.into(), rgb, camera })
