@@ -1,10 +1,17 @@
 //! The configuration file: TOML, every key optional, unknown keys refused with a suggestion.
 
+mod lamp;
+mod thermal;
+
+use std::cmp::Ordering;
 use std::io::Read;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+
+pub use lamp::LampConfig;
+pub use thermal::ThermalConfig;
 
 use crate::error::CommandError;
 
@@ -24,6 +31,10 @@ pub struct Config {
     pub api: ApiConfig,
     /// Which networks look at pictures.
     pub models: ModelsConfig,
+    /// When a hot box sheds load.
+    pub thermal: ThermalConfig,
+    /// What the driver sees and hears.
+    pub lamp: LampConfig,
     /// Where frames come from; without it stored plants are served and nothing else.
     pub source: Option<SourceConfig>,
 }
@@ -34,11 +45,22 @@ pub struct Config {
 pub struct StoreConfig {
     /// The SQLite file; relative to the working folder, which the service sets to /var/lib/demeter.
     pub path: PathBuf,
+    /// With less free than this, mebibytes, plants wait; they are stored when twice as much is free. The default is a
+    /// guess at what the system and the store's own log need to go on.
+    pub min_free_mib: u64,
+}
+
+impl StoreConfig {
+    /// [`StoreConfig::min_free_mib`] in bytes.
+    #[must_use]
+    pub fn min_free_bytes(&self) -> u64 {
+        self.min_free_mib.saturating_mul(1 << 20)
+    }
 }
 
 impl Default for StoreConfig {
     fn default() -> Self {
-        Self { path: "demeter.sqlite".into() }
+        Self { path: "demeter.sqlite".into(), min_free_mib: 64 }
     }
 }
 
@@ -196,6 +218,16 @@ impl Config {
                 found: config.api.listen.to_string(),
             });
         }
+        let ThermalConfig { hot_c, cool_c, .. } = config.thermal;
+        // NaN is not less than anything.
+        if cool_c.partial_cmp(&hot_c) != Some(Ordering::Less) {
+            return Err(ConfigError::Value {
+                path: path.into(),
+                key: "thermal.cool_c",
+                expected: "less than thermal.hot_c",
+                found: format!("{cool_c} and {hot_c}"),
+            });
+        }
         if config.models.mask.len() > 2 {
             return Err(ConfigError::Value {
                 path: path.into(),
@@ -247,11 +279,15 @@ mod tests {
         for (text, parts) in [
             ("[stroe]\npath = 'x'", &["stroe", "did you mean `store`?"][..]),
             ("[api]\nlistn = '127.0.0.1:1'", &["listn", "did you mean `listen`?"]),
-            ("[harvester]", &["harvester", "expected one of `store`, `api`, `models`, `source`"]),
+            ("[harvester]", &["harvester", "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `source`"]),
             ("[store]\npath = 5", &["path = 5", "integer", "expected"]),
             ("[api]\nlisten = 'here'", &["listen = 'here'", "address"]),
             ("[api]\nlisten = '0.0.0.0:8420'", &["api.listen", "loopback", "0.0.0.0:8420"]),
             ("[models]\nmask = ['a', 'b', 'c']", &["models.mask", "at most two", "\"c\""]),
+            ("[thermal]\nhot_c = 60", &["thermal.cool_c", "less than thermal.hot_c", "70 and 60"]),
+            ("[thermal]\nhot_c = nan", &["thermal.cool_c", "NaN"]),
+            ("[lamp]\nbuzer = 'x'", &["buzer", "did you mean `buzzer`?"]),
+            ("[store]\nmin_free_mib = -1", &["-1", "expected u64"]),
             ("[models]\nmasks = ['a']", &["masks", "did you mean `mask`?"]),
             ("[models]\ndepth = ['a']", &["depth", "string"]),
             ("[source]\nkind = 'camera'", &["camera", "`replay`"]),

@@ -5,9 +5,11 @@
 
 pub mod api;
 pub mod cli;
+pub mod clock;
 pub mod commands;
 pub mod config;
 mod cutter;
+pub mod daemon;
 pub mod describe;
 pub mod divider;
 pub mod error;
@@ -23,7 +25,7 @@ pub mod portrait;
 mod raster;
 pub mod reconstruct;
 pub mod report;
+pub mod status;
 pub mod store;
 pub mod studio;
 pub mod synthetic;
-pub mod worker;

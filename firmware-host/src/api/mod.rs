@@ -18,11 +18,11 @@ use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::get;
 use metrics_exporter_prometheus::{PrometheusHandle, PrometheusRecorder};
 use tokio::net::TcpListener;
-use tokio::sync::Notify;
+use tokio::sync::{Notify, watch};
 
+use crate::status::Status;
 use crate::store::{Reader, StoreError};
 use reply::ApiError;
-pub use status::{Activity, State};
 
 /// How long open connections may finish after the program was asked to stop: a guess.
 const GRACE: Duration = Duration::from_secs(3);
@@ -36,18 +36,23 @@ pub struct Api {
 struct Inner {
     /// One reader: SQLite's calls block, so they run on tokio's threads for blocking work, one at a time.
     reader: Mutex<Reader>,
-    activity: Activity,
+    status: watch::Receiver<Status>,
     recorder: Arc<PrometheusRecorder>,
     metrics: PrometheusHandle,
     port: u16,
 }
 
 impl Api {
-    /// An API over a store; `activity` is what the program says that it is doing, `address` where it listens.
+    /// An API over a store; `status` is what the daemon says about itself, `address` where it listens.
     #[must_use]
-    pub fn new(reader: Reader, activity: Activity, recorder: Arc<PrometheusRecorder>, address: SocketAddr) -> Self {
+    pub fn new(
+        reader: Reader,
+        status: watch::Receiver<Status>,
+        recorder: Arc<PrometheusRecorder>,
+        address: SocketAddr,
+    ) -> Self {
         let (metrics, port) = (recorder.handle(), address.port());
-        Self { inner: Arc::new(Inner { reader: Mutex::new(reader), activity, recorder, metrics, port }) }
+        Self { inner: Arc::new(Inner { reader: Mutex::new(reader), status, recorder, metrics, port }) }
     }
 
     /// Answers requests until `stop` is done.

@@ -1,48 +1,21 @@
-use std::sync::{Arc, Mutex, PoisonError};
-
 use axum::Json;
 use axum::extract::State as Extract;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use serde::Serialize;
-use serde_json::{Value, json};
 
 use super::Api;
 use super::reply::ApiError;
-use crate::store::Reader;
+use crate::status::Status;
+use crate::store::{Reader, Summary};
 
-/// What the program is doing, set by `run` and shown by the page; cheap to clone.
-#[derive(Clone, Debug, Default)]
-pub struct Activity {
-    state: Arc<Mutex<State>>,
-}
-
-/// The three colours of the page, and why.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-#[serde(tag = "state", content = "message", rename_all = "snake_case")]
-pub enum State {
-    /// No source of frames is configured: stored plants are shown.
-    #[default]
-    Idle,
-    /// Frames become plants.
-    Working,
-    /// The source came to its end.
-    Finished,
-    /// The pipeline stopped for this reason.
-    Failed(String),
-}
-
-impl Activity {
-    /// Says what the program does now.
-    pub fn set(&self, state: State) {
-        *self.state.lock().unwrap_or_else(PoisonError::into_inner) = state;
-    }
-
-    /// What the program does now.
-    #[must_use]
-    pub fn get(&self) -> State {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
+/// The answer of [`status`].
+#[derive(Debug, Serialize)]
+pub(super) struct Answer {
+    version: &'static str,
+    #[serde(flatten)]
+    status: Status,
+    store: Summary,
 }
 
 /// GET /healthz: the program runs and its store answers.
@@ -51,11 +24,11 @@ pub(super) async fn healthz(Extract(api): Extract<Api>) -> Result<&'static str, 
     Ok("ok\n")
 }
 
-/// GET /api/v1/status: what it does and what it has.
-pub(super) async fn status(Extract(api): Extract<Api>) -> Result<Json<Value>, ApiError> {
-    let summary = api.read(Reader::summary).await?;
-    let activity = api.inner.activity.get();
-    Ok(Json(json!({"version": env!("CARGO_PKG_VERSION"), "activity": activity, "store": summary})))
+/// GET /api/v1/status: what it does, how it is and what it has.
+pub(super) async fn status(Extract(api): Extract<Api>) -> Result<Json<Answer>, ApiError> {
+    let store = api.read(Reader::summary).await?;
+    let status = api.inner.status.borrow().clone();
+    Ok(Json(Answer { version: env!("CARGO_PKG_VERSION"), status, store }))
 }
 
 /// GET /metrics: Prometheus' text format.

@@ -7,6 +7,7 @@ use demeter_models::Runtime;
 use serde::Serialize;
 
 use crate::config::{Config, ModelsConfig};
+use crate::daemon::disk::{folder_of, free_bytes};
 use crate::error::{CommandError, Exit, chain};
 use crate::eye::Eye;
 use crate::files;
@@ -115,11 +116,10 @@ fn check_store(path: &Path) -> Result<String, Trouble> {
 }
 
 fn check_disk(store: &Path) -> Result<String, Trouble> {
-    let folder = store.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(store);
     let name = folder.display();
-    let space = rustix::fs::statvfs(folder)
+    let free = free_bytes(folder)
         .map_err(|error| Trouble { found: format!("{name}: {error}"), mend: "make the folder".into() })?;
-    let free = space.f_bavail.saturating_mul(space.f_frsize);
     let found = format!("{name}: {:.1} GB free", free as f64 / 1e9);
     if free < MIN_FREE { Err(Trouble { found, mend: "free at least 1 GiB".into() }) } else { Ok(found) }
 }

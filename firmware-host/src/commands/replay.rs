@@ -3,17 +3,17 @@
 use std::fmt::Write;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 
 use demeter_capture::{Pace, Replay, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::clock::SystemClock;
 use crate::config::Config;
 use crate::error::{CommandError, Exit};
 use crate::eye::Eye;
 use crate::files;
 use crate::output::Output;
-use crate::pipeline::{self, Outcome, Progress, Run};
+use crate::pipeline::{self, Control, Outcome, Progress, Run};
 use crate::report::Document;
 use crate::store::Store;
 
@@ -55,7 +55,8 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let mut eye = Eye::open(&Config::load(args.config.as_deref())?.models, NonZeroUsize::MIN)?;
     let store = Store::open(&args.db)?;
     let bar = progress_bar(source.len_hint());
-    let run = Run { manifest: &manifest, species: &species, store: &store, stop: &AtomicBool::new(false) };
+    let (control, clock) = (Control::default(), SystemClock::new());
+    let run = Run { manifest: &manifest, species: &species, store: &store, control: &control, clock: &clock, live: false };
     let outcome = pipeline::run(&run, &mut source, &mut eye, |progress| match progress {
         Progress::Frame => bar.inc(1),
         Progress::Plant(plant) => bar.set_message(plant.id.clone().unwrap_or_default()),

@@ -6,13 +6,14 @@ use demeter_recon::view::Closed;
 use serde_json::{Value, json};
 
 use super::looker::{BestView, Found, FrameKey};
-use super::{Outcome, Progress, Run};
+use super::{Outcome, Progress, Run, Working};
+use crate::clock::wall_time;
 use crate::describe::{Encoding, describe};
 use crate::error::chain;
 use crate::eye::Eye;
 use crate::picture;
 use crate::reconstruct::{ReconstructError, fit_organs};
-use crate::store::{NewPlant, StoreError};
+use crate::store::{NewPlant, Saved, StoreError};
 
 /// What every plant of the run depends on besides its frames.
 pub(super) fn provenance(eye: &Eye) -> Value {
@@ -37,9 +38,13 @@ pub(super) struct Keeper<'a> {
 }
 
 impl Keeper<'_> {
-    /// Takes what the looker found. Only the store's own failure is an error.
+    /// Takes what the looker found. Only the store's own failure is an error. A plant that comes when the run must have
+    /// ended is left out whole.
     pub(super) fn take(&mut self, found: Found, progress: &mut impl FnMut(Progress<'_>)) -> Result<(), StoreError> {
+        let run = self.run;
+        let working = run.control.keeper.work();
         match found {
+            Found::Plant(_) if run.control.overdue() => *self.outcome.lost.entry("stopped").or_default() += 1,
             Found::Seen { milliseconds } => {
                 tracing::debug!(milliseconds, "frame");
                 self.outcome.frames += 1;
@@ -60,7 +65,7 @@ impl Keeper<'_> {
                 let detail = json!({"frame": [camera.0, seq], "reason": reason, "message": message});
                 self.note("frame_unseen", &detail)?;
             }
-            Found::Plant(plant) => self.plant(&plant, progress)?,
+            Found::Plant(plant) => self.plant(&plant, &working, progress)?,
         }
         Ok(())
     }
@@ -68,6 +73,7 @@ impl Keeper<'_> {
     fn plant(
         &mut self,
         closed: &Closed<FrameKey, BestView>,
+        working: &Working<'_>,
         progress: &mut impl FnMut(Progress<'_>),
     ) -> Result<(), StoreError> {
         let started = Instant::now();
@@ -81,9 +87,9 @@ impl Keeper<'_> {
                     .note("plant_lost", &json!({"plant": id, "reason": error.name(), "message": chain(&error)}));
             }
         };
-        match self.run.store.save_plant(&plant) {
+        match self.save(&plant, working) {
             // A value that the store does not take costs this plant; a store that does not work ends the run.
-            Err(error @ (StoreError::Value { .. } | StoreError::Conflict { .. })) => {
+            Err(error) if error.is_full() || matches!(error, StoreError::Value { .. } | StoreError::Conflict { .. }) => {
                 *self.outcome.lost.entry("not_stored").or_default() += 1;
                 tracing::warn!("plant {id}: {}", chain(&error));
                 self.note("plant_lost", &json!({"plant": id, "reason": "not_stored", "message": chain(&error)}))
@@ -96,6 +102,20 @@ impl Keeper<'_> {
                 progress(Progress::Plant(&plant.report));
                 self.outcome.plants.push(plant.report);
                 Ok(())
+            }
+        }
+    }
+
+    /// Saves the plant, waiting for room where the disk is full: nothing in hand is given up for that.
+    fn save(&self, plant: &NewPlant, working: &Working<'_>) -> Result<Saved, StoreError> {
+        loop {
+            working.pause(|| self.run.control.wait_for_room());
+            match self.run.store.save_plant(plant) {
+                Err(error) if error.is_full() && !self.run.control.overdue() => {
+                    tracing::error!("plant waits for room: {}", chain(&error));
+                    self.run.control.storage_full(true);
+                }
+                done => return done,
             }
         }
     }
@@ -116,13 +136,17 @@ impl Keeper<'_> {
         let mut provenance = self.provenance.clone();
         let (camera, seq) = &closed.best_frame;
         provenance["best_frame"] = json!([camera.0, seq]);
+        let (time, time_trusted) = match self.run.live {
+            true => wall_time(self.run.clock, &best.stamp),
+            // A recording does not say whether its clock was synchronised.
+            false => (best.stamp.wall.clone(), false),
+        };
         Ok(NewPlant {
             report: made.report,
             record: made.record,
             session: self.run.manifest.session_id.clone(),
-            time: best.stamp.wall.clone(),
-            // A recording does not say whether its clock was synchronised.
-            time_trusted: false,
+            time,
+            time_trusted,
             position: Some(closed.position.extend(0.0)),
             geographic: None,
             models: self.models.clone(),
@@ -133,6 +157,13 @@ impl Keeper<'_> {
     }
 
     fn note(&self, kind: &str, detail: &Value) -> Result<(), StoreError> {
-        self.run.store.save_event(jiff::Timestamp::now(), kind, detail)
+        match self.run.store.save_event(self.run.clock.now().wall, kind, detail) {
+            // An event is no plant: on a full disk it is said in the log alone.
+            Err(error) if error.is_full() => {
+                tracing::warn!("{kind} {detail}: {}", chain(&error));
+                Ok(())
+            }
+            saved => saved,
+        }
     }
 }

@@ -1,16 +1,16 @@
 //! The second stage: network, lifting, and which plant along the row each sight belongs to.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::SyncSender;
 use std::time::Instant;
 
-use demeter_capture::Manifest;
 use demeter_frame::{CameraId, Frame, Pose, Rgb, Stamp};
 use demeter_recon::organs::{OrganCloud, ScaleSource};
 use demeter_recon::view::{Closed, Gate, Observation, Quality, Tracker};
 use glam::DVec2;
+use tokio::sync::mpsc::Receiver;
 
+use super::Run;
 use super::reader::Arrival;
 use crate::error::chain;
 use crate::eye::{Eye, Sight};
@@ -45,30 +45,40 @@ pub(super) enum Found {
 
 /// The stage's state.
 pub(super) struct Looker<'a> {
-    manifest: &'a Manifest,
+    run: &'a Run<'a>,
     eye: &'a mut Eye,
     tracker: Tracker<FrameKey, BestView>,
     odometer: Odometer,
 }
 
 impl<'a> Looker<'a> {
-    pub(super) fn new(manifest: &'a Manifest, eye: &'a mut Eye) -> Self {
-        let spacing = manifest.rows.iter().filter_map(|row| row.plant_spacing_m).reduce(f64::min);
-        Self { manifest, eye, tracker: Tracker::new(Gate::of_spacing(spacing)), odometer: Odometer::default() }
+    pub(super) fn new(run: &'a Run<'a>, eye: &'a mut Eye) -> Self {
+        let spacing = run.manifest.rows.iter().filter_map(|row| row.plant_spacing_m).reduce(f64::min);
+        Self { run, eye, tracker: Tracker::new(Gate::of_spacing(spacing)), odometer: Odometer::default() }
     }
 
-    /// Works until no more frames come or nobody listens. A run that was stopped leaves the plants in view out.
-    pub(super) fn look(mut self, frames: Receiver<Arrival>, stop: &AtomicBool, to: &SyncSender<Found>) {
-        for arrival in frames {
+    /// Works until no more frames come or nobody listens. A recording that was stopped leaves the plants in view out:
+    /// half-seen they would stand in the way of the whole ones when it is replayed. A camera never sees them again.
+    pub(super) fn look(mut self, mut frames: Receiver<Arrival>, to: &SyncSender<Found>) {
+        let control = self.run.control;
+        while let Some(arrival) = frames.blocking_recv() {
+            if control.overdue() {
+                break;
+            }
+            let started = Instant::now();
+            let working = control.looker.work();
             let found = match arrival {
                 Arrival::Refused { frame, reason, message } => vec![Found::Refused { frame, reason, message }],
                 Arrival::Frame(frame, rgb) => self.frame(&frame, &rgb),
             };
+            drop(working);
+            let worked = started.elapsed();
             if found.into_iter().any(|found| to.send(found).is_err()) {
                 return;
             }
+            control.rest(worked);
         }
-        if stop.load(Ordering::Relaxed) {
+        if control.stopping() && !self.run.live {
             return;
         }
         for plant in self.tracker.finish() {
@@ -81,7 +91,7 @@ impl<'a> Looker<'a> {
     fn frame(&mut self, frame: &Frame, rgb: &Rgb) -> Vec<Found> {
         let key = (frame.camera.clone(), frame.seq);
         let unseen = |reason, message| vec![Found::Unseen { frame: key.clone(), reason, message }];
-        let Some(camera) = self.manifest.camera(&frame.camera) else {
+        let Some(camera) = self.run.manifest.camera(&frame.camera) else {
             return unseen("unknown_camera", format!("camera {} is not in the session", frame.camera));
         };
         let Some(pose) = frame.world_from_camera else {

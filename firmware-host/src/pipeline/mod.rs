@@ -6,14 +6,17 @@
 //! ```
 //!
 //! Three threads and two bounded queues: whoever is slow makes the one before wait, so a recording is never thinned out.
+//! Only cameras cannot wait: their frames are dropped before the first queue, and counted. [`Control`] is how the daemon
+//! watches the stages, slows them down and ends them.
 //! Each stage works in the order of the frames, so what is stored does not depend on which thread ran when.
 
+mod beat;
+mod control;
 mod keep;
 mod looker;
 mod reader;
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
@@ -21,6 +24,10 @@ use demeter_capture::{Counts, Manifest, Source};
 use demeter_recon::model::Species;
 use serde::Serialize;
 
+pub use beat::{Beat, Working};
+pub use control::Control;
+
+use crate::clock::Clock;
 use crate::eye::Eye;
 use crate::report::PlantReport;
 use crate::store::{NewSession, Store, StoreError};
@@ -38,9 +45,12 @@ pub struct Run<'a> {
     pub species: &'a Species,
     /// Where plants go.
     pub store: &'a Store,
-    /// Set from outside, it ends the run soon. Plants that are not stored by then are left out, because half-seen ones
-    /// would stand in the way of the whole ones when the same recording is replayed.
-    pub stop: &'a AtomicBool,
+    /// What it shows of itself and how it is told to slow down or to stop.
+    pub control: &'a Control,
+    /// What events are dated by, and the plants of a live run.
+    pub clock: &'a dyn Clock,
+    /// Frames come from cameras: they do not wait and do not come again.
+    pub live: bool,
 }
 
 /// What happened, told as it happens.
@@ -109,12 +119,11 @@ pub fn run(
     let models = eye.models().into_iter().map(|(_, sha256)| sha256.to_owned()).collect();
     let mut keeper = keep::Keeper { run, provenance, models, outcome: Outcome::default() };
     let joined = std::thread::scope(|scope| {
-        let (to_looker, frames) = sync_channel(FRAMES_WAITING);
+        let (to_looker, frames) = tokio::sync::mpsc::channel(FRAMES_WAITING);
         let (to_keeper, sights) = sync_channel(PLANTS_WAITING);
-        let reader = scope.spawn(move || reader::read(source, run.stop, &to_looker));
-        let looker = scope.spawn(move || looker::Looker::new(run.manifest, eye).look(frames, run.stop, &to_keeper));
-        let going = |_: &_| !run.stop.load(Ordering::Relaxed);
-        let kept = sights.into_iter().take_while(going).try_for_each(|found| keeper.take(found, &mut progress));
+        let reader = scope.spawn(move || reader::read(run, source, &to_looker));
+        let looker = scope.spawn(move || looker::Looker::new(run, eye).look(frames, &to_keeper));
+        let kept = sights.into_iter().try_for_each(|found| keeper.take(found, &mut progress));
         // With the receiver gone the stages before end at their next send.
         let counts = reader.join().map_err(|_panic| PipelineError::Panicked { stage: "reader" });
         let looked = looker.join().map_err(|_panic| PipelineError::Panicked { stage: "looker" });
@@ -126,10 +135,11 @@ pub fn run(
     let frames_per_second = outcome.frames as f64 / outcome.seconds.max(1e-9);
     let detail = serde_json::json!({
         "session": run.manifest.session_id, "frames": outcome.frames, "refused": outcome.gate.refused,
-        "unseen": outcome.unseen, "plants": outcome.plants.len(), "lost": outcome.lost, "ended": outcome.ended,
+        "unseen": outcome.unseen, "dropped": run.control.dropped(), "plants": outcome.plants.len(),
+        "lost": outcome.lost, "ended": outcome.ended,
         "frames_per_second": frames_per_second,
     });
-    run.store.save_event(jiff::Timestamp::now(), "run_finished", &detail)?;
+    run.store.save_event(run.clock.now().wall, "run_finished", &detail)?;
     Ok(outcome)
 }
 
@@ -145,7 +155,7 @@ fn save_names(run: &Run<'_>, eye: &Eye) -> Result<(), StoreError> {
     for degraded in eye.degraded() {
         tracing::warn!("{degraded}");
         let detail = serde_json::json!({"role": degraded.role, "why": degraded.why});
-        run.store.save_event(jiff::Timestamp::now(), "degraded", &detail)?;
+        run.store.save_event(run.clock.now().wall, "degraded", &detail)?;
     }
     eye.models().into_iter().try_for_each(|(name, sha256)| run.store.save_model(sha256, name))
 }

@@ -1,11 +1,10 @@
 //! The first stage: frames from a source, through the gate.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::SyncSender;
-
 use demeter_capture::{Counts, Gate, GateConfig, Source, SourceError};
 use demeter_frame::{Frame, Rgb};
+use tokio::sync::mpsc::Sender;
 
+use super::Run;
 use crate::error::chain;
 
 /// What leaves the stage, in the order of the source.
@@ -23,12 +22,25 @@ pub(super) enum Arrival {
     },
 }
 
-/// Reads to the end of the source, until it is told to stop or nobody listens; gives the gate's counts and why the source ended early.
-pub(super) fn read(source: &mut dyn Source, stop: &AtomicBool, to: &SyncSender<Arrival>) -> (Counts, Option<String>) {
+/// Reads to the end of the source, until it is told to stop or nobody listens; gives the gate's counts and why the source
+/// ended early.
+///
+/// A recording waits for whoever is slow. A camera does not: while the queue is full its frames are dropped before they
+/// are decoded, so those that pass lie as evenly along the way as the box can take them, and each plant is still seen
+/// from the middle of the picture.
+pub(super) fn read(run: &Run<'_>, source: &mut dyn Source, to: &Sender<Arrival>) -> (Counts, Option<String>) {
     let mut gate = Gate::new(GateConfig::default());
-    while !stop.load(Ordering::Relaxed) {
-        let arrival = match source.next() {
+    while !run.control.stopping() {
+        let next = source.next();
+        let working = run.control.reader.work();
+        // This is the only sender, so room that is seen here is still there below.
+        let crowded = run.live && to.capacity() == 0;
+        let arrival = match next {
             Ok(None) => return (gate.counts().clone(), None),
+            Ok(Some(_)) if crowded => {
+                run.control.drop_frame();
+                continue;
+            }
             Ok(Some(frame)) => match gate.admit(&frame) {
                 Ok(rgb) => Arrival::Frame(frame, rgb),
                 Err(refusal) => Arrival::Refused {
@@ -43,7 +55,8 @@ pub(super) fn read(source: &mut dyn Source, stop: &AtomicBool, to: &SyncSender<A
                 Arrival::Refused { frame: None, reason: error.reason().name(), message: chain(&error) }
             }
         };
-        if to.send(arrival).is_err() {
+        drop(working);
+        if to.blocking_send(arrival).is_err() {
             break;
         }
     }

@@ -1,5 +1,7 @@
 use std::path::PathBuf;
 
+use rusqlite::ErrorCode;
+
 use crate::error::{CommandError, Exit};
 
 /// Why the store refuses.
@@ -40,6 +42,12 @@ pub enum StoreError {
         expected: &'static str,
         /// The value in force.
         found: String,
+    },
+    /// Somebody else holds it.
+    #[error("store {path}: expected to be alone with it, found another reader or writer")]
+    Busy {
+        /// Its path.
+        path: PathBuf,
     },
     /// The id is taken by something else.
     #[error("{what} {id}: already stored with another content")]
@@ -85,6 +93,14 @@ pub enum StoreError {
         /// The system's own error.
         source: std::io::Error,
     },
+}
+
+impl StoreError {
+    /// Whether the disk has no room: what was acknowledged stays, and the same may be tried again.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        matches!(self, Self::Sqlite { source, .. } if source.sqlite_error_code() == Some(ErrorCode::DiskFull))
+    }
 }
 
 impl From<StoreError> for CommandError {

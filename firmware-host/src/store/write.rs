@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use demeter_recon::model::Species;
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
@@ -50,6 +51,22 @@ impl Store {
     /// [`StoreError::Sqlite`] when they cannot be read.
     pub fn pragmas(&self) -> Result<Vec<(&'static str, String)>, StoreError> {
         connection::pragmas(&self.lock())
+    }
+
+    /// Brings everything into the file itself, so that the log beside it is empty: for the end of the program.
+    ///
+    /// # Errors
+    /// [`StoreError`] when another program reads or writes just now, or a thread of this one is stuck in the store;
+    /// nothing is lost then, the next start reads the log.
+    pub fn settle(&self) -> Result<(), StoreError> {
+        let stuck = |_| StoreError::Busy { path: self.path.clone() };
+        let connection = self.connection.try_lock().map_err(stuck)?;
+        // The program is about to end and the power may be, too.
+        connection.busy_timeout(Duration::from_millis(500)).doing("setting the busy timeout")?;
+        let busy: bool = connection
+            .query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |row| row.get(0))
+            .doing("writing the log into the file")?;
+        if busy { Err(StoreError::Busy { path: self.path.clone() }) } else { Ok(()) }
     }
 
     /// Saves a session with its rig and cameras; the same again changes nothing.

@@ -1,0 +1,104 @@
+//! The daemon's tick: look at everything, say how it is.
+
+use std::ops::ControlFlow::{self, Break, Continue};
+use std::time::Instant;
+
+use sd_notify::NotifyState;
+use serde_json::json;
+
+use super::event::Event;
+use super::watchdog::{self, STUCK};
+use super::{Daemon, Links, notify};
+use crate::clock::Clock;
+use crate::error::{CommandError, Exit};
+use crate::status::{Activity, Health, Reason, Stage, Status};
+
+/// Ticks between two looks at everything: one second.
+const LOOK_EVERY: u32 = 4;
+
+/// Ticks between two questions whether the clock is synchronised: 10 s, because each starts a small program.
+const CLOCK_EVERY: u32 = 40;
+
+impl Daemon {
+    pub(super) fn tick(&mut self, links: &Links) -> ControlFlow<Result<Exit, CommandError>> {
+        let now = Instant::now();
+        if self.give_up.is_some_and(|give_up| now >= give_up) {
+            tracing::warn!("the pipeline did not end in time and is left to itself");
+            return Break(Ok(Exit::Done));
+        }
+        if self.steps.is_multiple_of(CLOCK_EVERY) {
+            let clock = self.clock.clone();
+            tokio::task::spawn_blocking(move || clock.ask());
+        }
+        if self.steps.is_multiple_of(LOOK_EVERY) {
+            self.look(now, links);
+        }
+        self.steps = self.steps.wrapping_add(1);
+        let health = self.status.borrow().health;
+        // Tried again at the next step: the output may be a device that comes later.
+        self.dark = self.lamp.show(health).err().map(|error| error.to_string());
+        Continue(())
+    }
+
+    /// Reads the sensors, tells the line, asks the store, feeds the watchdog.
+    fn look(&mut self, now: Instant, links: &Links) {
+        let heat = self.thermal.update(now);
+        let waiting = self.line.as_ref().is_some_and(|control| control.is_full());
+        let disk = self.disk.update(waiting);
+        let (mut stages, mut frames_dropped) = (Vec::new(), 0);
+        if let Some(control) = &self.line {
+            control.slow_down(heat.slowness);
+            control.storage_full(disk.full);
+            stages = watchdog::stages(control, now);
+            frames_dropped = control.dropped();
+        }
+        let before = self.status.borrow().clone();
+        if (before.heat.slowness, before.disk.full) != (heat.slowness, disk.full) {
+            tracing::info!(slowness = heat.slowness, full = disk.full, "load");
+            self.note("load", json!({"heat": heat, "disk": disk}));
+        }
+        let time_trusted = self.clock.synchronised();
+        let status = Status { stages, frames_dropped, time_trusted, heat, disk, ..before };
+        let silent = self.store_beat.silent(now);
+        let reasons = self.reasons(&status, silent);
+        let health = reasons.first().map_or(Health::Works, |reason| reason.health);
+        if !silent && !status.stages.iter().any(|stage| stage.stuck) {
+            notify(&[NotifyState::Watchdog]);
+        }
+        self.status.send_replace(Status { health, reasons, ..status });
+        if self.store_beat.ask() {
+            let (api, news) = (links.api.clone(), links.news.clone());
+            tokio::spawn(async move {
+                let well = api.alive().await;
+                news.send(Event::StoreAnswered(well)).await.unwrap_or_default();
+            });
+        }
+    }
+
+    /// What is not as it should be, worst first.
+    fn reasons(&self, status: &Status, silent: bool) -> Vec<Reason> {
+        let broken = |kind, message| Reason { health: Health::Broken, kind, message };
+        let degraded = |kind, message| Reason { health: Health::Degraded, kind, message };
+        let failed = match &status.activity {
+            Activity::Failed(why) => Some(broken("pipeline", why.clone())),
+            _ => None,
+        };
+        let silent = silent.then(|| broken("store", format!("the store has not answered for {} s", STUCK.as_secs())));
+        let full = status.disk.full.then(|| {
+            let least = self.config.store.min_free_mib;
+            broken("storage_full", format!("the disk is full: plants wait until {} MiB are free", 2 * least))
+        });
+        let stuck = |stage: &Stage| {
+            let seconds = stage.busy_seconds.unwrap_or_default();
+            broken("stuck", format!("the {} has been at one item for {seconds:.0} s", stage.name))
+        };
+        let stuck = status.stages.iter().filter(|stage| stage.stuck).map(stuck);
+        let hot = (status.heat.slowness > 1).then(|| {
+            let (celsius, part) = (status.heat.celsius.unwrap_or_default(), status.heat.slowness);
+            degraded("hot", format!("the box is hot ({celsius:.0} °C) and works 1 second in {part}"))
+        });
+        let refused = self.refused.clone().map(|why| degraded("configuration", why));
+        let dark = self.dark.clone().map(|why| degraded("lamp", why));
+        failed.into_iter().chain(silent).chain(full).chain(stuck).chain(hot).chain(refused).chain(dark).collect()
+    }
+}
