@@ -20,6 +20,8 @@ const STATES = {
   idle: ["wait", "Waiting", "No camera or recording is configured. Stored plants are shown."],
   failed: ["bad", "Stopped", ""],
 };
+// Where something is wrong, its colour and its reasons stand instead.
+const WRONG = { degraded: "wait", broken: "bad" };
 
 let known = null; // Plants in the store at the last look: the list is fetched again when it changes.
 let next = null;
@@ -47,9 +49,13 @@ function show(colour, word, text) {
 async function poll() {
   try {
     const status = await ask("/api/v1/status");
-    const { state, message } = status.activity;
-    const [colour, word, text] = STATES[state];
-    show(colour, word, message ?? text);
+    const [colour, word, text] = STATES[status.health === "broken" ? "failed" : status.activity.state];
+    const reasons = status.reasons.map((reason) => reason.message).join(". ");
+    show(WRONG[status.health] ?? colour, word, reasons || (status.activity.message ?? text));
+    const stage = ({ name, busy_seconds: busy, stuck }) =>
+      cell(`${name}: ${stuck ? "stuck" : busy == null ? "waiting" : "busy"}`, "li");
+    $("stages").replaceChildren(...status.stages.map(stage));
+    $("clock").textContent = status.time_trusted ? "" : "The clock is not set: times may be wrong.";
     $("count-plants").textContent = status.store.plants;
     $("count-unsent").textContent = status.store.unsent;
     $("count-last").textContent = status.store.last_plant ? time(status.store.last_plant) : "none yet";

@@ -8,16 +8,18 @@ use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
-use common::{Bench, bench};
-use demeter::api::{Activity, Api, State};
+use common::{Bench, stored};
+use demeter::api::Api;
 use demeter::report::Document;
+use demeter::status::{Activity, Health, Reason, Status};
 use metrics_exporter_prometheus::PrometheusBuilder;
-use serde_json::Value;
+use serde_json::{Value, json};
+use tokio::sync::watch;
 
 /// A server that lives as long as this.
 struct Server {
     bench: Bench,
-    activity: Activity,
+    status: watch::Sender<Status>,
     address: SocketAddr,
     _runtime: tokio::runtime::Runtime,
 }
@@ -40,18 +42,15 @@ impl Answer {
 }
 
 fn server(plants: u32) -> Server {
-    let bench = bench();
-    for n in 1..=plants {
-        bench.store.save_plant(&bench.plant(n)).unwrap();
-    }
+    let bench = stored(plants);
     let runtime = tokio::runtime::Runtime::new().unwrap();
     let listener = runtime.block_on(tokio::net::TcpListener::bind("127.0.0.1:0")).unwrap();
     let address = listener.local_addr().unwrap();
-    let activity = Activity::default();
+    let status = watch::Sender::new(Status::default());
     let recorder = Arc::new(PrometheusBuilder::new().build_recorder());
-    let api = Api::new(bench.store.reader().unwrap(), activity.clone(), recorder, address);
+    let api = Api::new(bench.store.reader().unwrap(), status.subscribe(), recorder, address);
     runtime.spawn(api.serve(listener, std::future::pending()));
-    Server { bench, activity, address, _runtime: runtime }
+    Server { bench, status, address, _runtime: runtime }
 }
 
 impl Server {
@@ -79,8 +78,16 @@ fn health_status_and_metrics_tell_what_the_store_holds() {
     let status = server.get("/api/v1/status").json();
     assert_eq!(status["activity"]["state"], "idle");
     assert_eq!((&status["store"]["plants"], &status["store"]["unsent"]), (&3.into(), &3.into()));
-    server.activity.set(State::Failed("the camera burnt".into()));
-    assert_eq!(server.get("/api/v1/status").json()["activity"]["message"], "the camera burnt");
+    assert_eq!((&status["health"], &status["reasons"]), (&"works".into(), &json!([])));
+    let why = Reason { health: Health::Broken, kind: "pipeline", message: "the camera burnt".into() };
+    server.status.send_modify(|status| {
+        status.activity = Activity::Failed(why.message.clone());
+        (status.health, status.reasons) = (why.health, vec![why]);
+    });
+    let status = server.get("/api/v1/status").json();
+    assert_eq!(status["activity"]["message"], "the camera burnt");
+    let why = json!({"health": "broken", "kind": "pipeline", "message": "the camera burnt"});
+    assert_eq!((&status["health"], &status["reasons"]), (&"broken".into(), &json!([why])));
     let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
     assert!(metrics.contains("demeter_plants 3"), "{metrics}");
 }

@@ -1,24 +1,12 @@
-//! `demeter plants`, `demeter run` and `demeter doctor` over a store on disk.
+//! `demeter plants` and `demeter doctor` over a store on disk.
 #![allow(clippy::unwrap_used)]
 
 mod common;
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
-use std::os::unix::net::UnixDatagram;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
-use std::time::Duration;
+use std::process::{Command, Output};
 
-use common::{Bench, bench};
-
-fn stored(plants: u32) -> Bench {
-    let bench = bench();
-    for n in 1..=plants {
-        bench.store.save_plant(&bench.plant(n)).unwrap();
-    }
-    bench
-}
+use common::{Bench, stored};
 
 fn demeter(bench: &Bench, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_demeter"));
@@ -103,100 +91,6 @@ fn what_is_not_there_is_named_and_ends_with_the_contracts_code() {
     for arguments in [&["plants", "list"][..], &["run"]] {
         assert_eq!(demeter(&bench, arguments).status.code(), Some(78), "{arguments:?}");
     }
-}
-
-/// A daemon that does not outlive a test that failed.
-struct Daemon(Child);
-
-impl Drop for Daemon {
-    fn drop(&mut self) {
-        // It may have ended already.
-        self.0.kill().unwrap_or_default();
-    }
-}
-
-/// A running daemon that was told to listen on a free port, and its address.
-fn daemon(bench: &Bench, source: &str) -> (Daemon, String) {
-    let notify = bench.folder.path().join("notify");
-    let socket = UnixDatagram::bind(&notify).unwrap();
-    socket.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
-    let config = format!("[store]\npath = 'demeter.sqlite'\n[api]\nlisten = '127.0.0.1:0'\n{source}");
-    std::fs::write(bench.folder.path().join("demeter.toml"), config).unwrap();
-    let mut daemon = Command::new(env!("CARGO_BIN_EXE_demeter"))
-        .args(["run", "--config", "demeter.toml"])
-        .current_dir(bench.folder.path())
-        .env("NOTIFY_SOCKET", &notify)
-        .env("DEMETER_ONNXRUNTIME", "/no/such/library.so")
-        .env_remove("RUST_LOG")
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut ready = [0; 64];
-    let length = socket.recv(&mut ready).unwrap();
-    assert_eq!(text(&ready[..length]).trim(), "READY=1");
-    let mut log = BufReader::new(daemon.stderr.take().unwrap()).lines();
-    let line = log.find(|line| line.as_ref().unwrap().contains("http://")).unwrap().unwrap();
-    std::thread::spawn(move || log.for_each(drop));
-    (Daemon(daemon), line.split("http://").nth(1).unwrap().trim().to_owned())
-}
-
-fn get(address: &str, path: &str) -> String {
-    let mut stream = TcpStream::connect(address).unwrap();
-    write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
-    answer
-}
-
-fn terminate(mut daemon: Daemon) {
-    let killed = Command::new("kill").args(["-TERM", &daemon.0.id().to_string()]).status().unwrap();
-    assert!(killed.success());
-    assert_eq!(daemon.0.wait().unwrap().code(), Some(0));
-}
-
-#[test]
-fn the_daemon_says_ready_answers_and_ends_well_on_sigterm() {
-    let bench = stored(2);
-    let (daemon, address) = daemon(&bench, "");
-    assert!(get(&address, "/healthz").starts_with("HTTP/1.1 200"));
-    assert!(get(&address, "/api/v1/status").contains("\"idle\""));
-    // A client that sends nothing and never closes does not keep it.
-    let _silent = TcpStream::connect(&address).unwrap();
-    terminate(daemon);
-    assert_eq!(bench.number("SELECT count(*) FROM plants"), 2);
-}
-
-#[test]
-fn a_source_that_cannot_start_is_said_on_the_page_and_plants_are_still_served() {
-    for (source, why) in [
-        ("[source]\nkind = 'replay'\nsession = 'no-such-session'", "no-such-session"),
-        ("[source]\nkind = 'synthetic'\nplants = 1", "/no/such/library.so"),
-        ("[source]\nkind = 'synthetic'\nspecies = 'oak'", "soybean"),
-    ] {
-        let bench = stored(1);
-        let (daemon, address) = daemon(&bench, source);
-        let mut status = String::new();
-        for _ in 0..600 {
-            status = get(&address, "/api/v1/status");
-            if !status.contains("\"working\"") {
-                break;
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        assert!(status.contains("\"failed\"") && status.contains(why), "{source}: {status}");
-        assert!(get(&address, "/api/v1/plants/row-0001").starts_with("HTTP/1.1 200"));
-        terminate(daemon);
-    }
-}
-
-#[test]
-fn bad_configurations_end_with_2_and_name_the_key() {
-    let bench = stored(0);
-    let config = bench.folder.path().join("bad.toml");
-    std::fs::write(&config, "[api]\nlisten_on = '127.0.0.1:0'\n").unwrap();
-    let output = demeter(&bench, &["run", "--config", "bad.toml"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("listen_on"), "{}", text(&output.stderr));
 }
 
 #[test]

@@ -56,7 +56,8 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let store = Store::open(&args.db)?;
     let bar = progress_bar(source.len_hint());
     let (control, clock) = (Control::default(), SystemClock::new());
-    let run = Run { manifest: &manifest, species: &species, store: &store, control: &control, clock: &clock, live: false };
+    let run =
+        Run { manifest: &manifest, species: &species, store: &store, control: &control, clock: &clock, live: false };
     let outcome = pipeline::run(&run, &mut source, &mut eye, |progress| match progress {
         Progress::Frame => bar.inc(1),
         Progress::Plant(plant) => bar.set_message(plant.id.clone().unwrap_or_default()),

@@ -59,10 +59,9 @@ impl Daemon {
         }
         let time_trusted = self.clock.synchronised();
         let status = Status { stages, frames_dropped, time_trusted, heat, disk, ..before };
-        let silent = self.store_beat.silent(now);
-        let reasons = self.reasons(&status, silent);
+        let reasons = self.reasons(&status, self.store_beat.silent(now));
         let health = reasons.first().map_or(Health::Works, |reason| reason.health);
-        if !silent && !status.stages.iter().any(|stage| stage.stuck) {
+        if watchdog::alive(&status.stages, &self.store_beat, now) {
             notify(&[NotifyState::Watchdog]);
         }
         self.status.send_replace(Status { health, reasons, ..status });

@@ -285,7 +285,8 @@ impl Daemon {
     /// Notes what happened in the store, without waiting for it.
     fn note(&self, kind: &'static str, detail: Value) {
         let (store, now) = (self.store.clone(), self.clock.now().wall);
-        let save = move || store.save_event(now, kind, &detail).unwrap_or_else(|error| tracing::warn!("{}", chain(&error)));
+        let save =
+            move || store.save_event(now, kind, &detail).unwrap_or_else(|error| tracing::warn!("{}", chain(&error)));
         tokio::task::spawn_blocking(save);
     }
 }

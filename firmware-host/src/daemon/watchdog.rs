@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::pipeline::Control;
+use crate::pipeline::{Beat, Control};
 use crate::status::Stage;
 
 /// A stage that has had one item in hand for longer is stuck, and a store that has not answered for longer is silent.
@@ -12,11 +12,17 @@ pub const STUCK: Duration = Duration::from_secs(15);
 /// What the stages do now.
 #[must_use]
 pub fn stages(control: &Control, now: Instant) -> Vec<Stage> {
-    let stage = |(name, beat): (_, &crate::pipeline::Beat)| {
+    let stage = |(name, beat): (_, &Beat)| {
         let busy = beat.busy(now);
         Stage { name, busy_seconds: busy.map(|busy| busy.as_secs_f64()), stuck: busy.is_some_and(|busy| busy > STUCK) }
     };
     control.beats().into_iter().map(stage).collect()
+}
+
+/// Whether systemd's watchdog may be fed.
+#[must_use]
+pub fn alive(stages: &[Stage], store: &StoreBeat, now: Instant) -> bool {
+    !store.silent(now) && !stages.iter().any(|stage| stage.stuck)
 }
 
 /// The store's own heartbeat: it is asked, and has to answer.

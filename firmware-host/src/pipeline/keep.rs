@@ -89,7 +89,9 @@ impl Keeper<'_> {
         };
         match self.save(&plant, working) {
             // A value that the store does not take costs this plant; a store that does not work ends the run.
-            Err(error) if error.is_full() || matches!(error, StoreError::Value { .. } | StoreError::Conflict { .. }) => {
+            Err(error)
+                if error.is_full() || matches!(error, StoreError::Value { .. } | StoreError::Conflict { .. }) =>
+            {
                 *self.outcome.lost.entry("not_stored").or_default() += 1;
                 tracing::warn!("plant {id}: {}", chain(&error));
                 self.note("plant_lost", &json!({"plant": id, "reason": "not_stored", "message": chain(&error)}))

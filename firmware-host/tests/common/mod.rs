@@ -1,16 +1,21 @@
 //! A store in a temporary folder with a session, a species and a network, and plants to put into it.
 #![allow(dead_code)]
 
+pub(crate) mod daemon;
+
 use std::path::PathBuf;
 
 use demeter::report::{Kind, OrganReport, PlantReport};
 use demeter::store::{NewPlant, NewSession, Store};
-use demeter_frame::Pose;
+use demeter::synthetic::Synthetic;
+use demeter_capture::Manifest;
+use demeter_frame::{Intrinsics, Pose};
 use demeter_recon::model::leaf::Blade;
 use demeter_recon::model::{Form, Joint, Organ, Plant, Species};
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::record::encode_compact;
 use demeter_recon::traits::{Quantity, Unit};
+use demeter_recon::world::Row;
 use glam::{DQuat, DVec3};
 
 pub(crate) struct Bench {
@@ -32,6 +37,24 @@ pub(crate) fn bench() -> Bench {
     let cameras = vec![("nadir".to_owned(), serde_json::json!({"fx": 500.0}))];
     store.save_session(&NewSession { id: "row".into(), rig: "rig-1".into(), cameras }).unwrap();
     Bench { folder, path, store, species }
+}
+
+/// A rig before so many plants of a species, four frames each, and its session.
+pub(crate) fn row(species: &Species, plants: usize, id: &str) -> (Synthetic, Manifest) {
+    let plan = Row { plants, spacing: 0.35, age: 0.25, frames: 4 * plants };
+    let camera = Intrinsics::from_hfov(640, 480, 0.733);
+    let source = Synthetic::new(species, &plan, camera, 0, id.into()).unwrap();
+    let manifest = source.manifest("soybean", &plan);
+    (source, manifest)
+}
+
+/// The store with so many plants in it.
+pub(crate) fn stored(plants: u32) -> Bench {
+    let bench = bench();
+    for n in 1..=plants {
+        bench.store.save_plant(&bench.plant(n)).unwrap();
+    }
+    bench
 }
 
 impl Bench {
