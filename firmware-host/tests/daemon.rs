@@ -72,7 +72,8 @@ fn what_cannot_start_ends_with_the_contracts_code_and_is_never_ready() {
         let store = Connection::open(folder.join("demeter.sqlite")).unwrap();
         store.pragma_update(None, "user_version", 99).unwrap();
     };
-    let bad: [(&str, i32, fn(&Path)); 4] = [
+    type Spoil = fn(&Path);
+    let bad: [(&str, i32, Spoil); 4] = [
         ("listen_on = '127.0.0.1:0'", 2, |_| {}),
         ("", 2, |folder| std::fs::write(folder.join("demeter.sqlite"), "words".repeat(1000)).unwrap()),
         ("", 78, newer),
@@ -155,7 +156,7 @@ fn whole(bench: &Bench) {
 fn kill9() {
     let kills: u64 = std::env::var("KILLS").map_or(5, |kills| kills.parse().unwrap());
     let seed = 20_261_123_u64;
-    println!("seed {seed}");
+    eprintln!("seed {seed}");
     let bench = configured(0, LONG);
     let (mut acknowledged, mut random) = (Vec::new(), seed);
     for kill in 0..kills {
