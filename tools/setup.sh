@@ -10,6 +10,8 @@ command -v cc >/dev/null || packages+=(build-essential)
 # ONNX Runtime's library comes out of a Python wheel.
 python3 -m pip --version >/dev/null 2>&1 || packages+=(python3-pip)
 [ -e /etc/ssl/certs/ca-certificates.crt ] || packages+=(ca-certificates)
+# The crate v4l reads the kernel's camera interface from its headers.
+compgen -G '/usr/lib/llvm-*/lib/libclang.so' >/dev/null || packages+=(libclang-14-dev)
 if [ "${1:-}" = training ]; then
     /usr/bin/python3 -c 'import torch' 2>/dev/null || packages+=(python3-torch)
     /usr/bin/python3 -c 'import PIL' 2>/dev/null || packages+=(python3-pil)

@@ -45,6 +45,8 @@ reasons! {
     OversizedFile = "oversized_file",
     /// The frame's bytes are not those that were recorded.
     HashMismatch = "hash_mismatch",
+    /// The driver marked the frame as damaged.
+    DamagedBuffer = "damaged_buffer",
     /// The camera delivered a sequence number that is not above its last.
     BackwardSequence = "backward_sequence",
     /// The camera delivered a monotonic time that is not after its last.

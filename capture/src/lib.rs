@@ -17,13 +17,20 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod camera;
 mod counts;
 mod gate;
+mod libcamera;
 mod order;
 mod pixels;
 mod session;
 mod source;
+mod v4l2;
 
+pub use camera::{
+    Backend, CameraFault, CameraHealth, CameraSettings, CameraState, Cameras, CamerasHealth, Controls, Mode, Mount,
+    longest_exposure, sampling,
+};
 pub use counts::{Counts, Reason};
 pub use gate::{Gate, GateConfig, Refusal, Verdict};
 pub use pixels::{DecodeError, MAX_PIXELS, decode, decode_photo};
@@ -31,4 +38,5 @@ pub use session::{
     FileFault, FrameError, FrameFault, MAX_FRAME_BYTES, Manifest, ManifestError, Pace, Recorder, Replay, Row,
     SCHEMA_VERSION, SessionCamera, SessionError,
 };
-pub use source::{Source, SourceError};
+pub use source::{CameraError, Source, SourceError};
+pub use v4l2::{Device, OfferedMode, devices};

@@ -1,4 +1,4 @@
-use demeter_frame::Frame;
+use demeter_frame::{CameraId, Frame};
 
 use crate::{FrameError, Reason};
 
@@ -22,6 +22,12 @@ pub enum SourceError {
     /// One frame is lost; call again.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// One frame of a camera is lost; call again.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// No frame for a while, and nothing wrong: call again, or stop waiting.
+    #[error("no camera gave a frame for a while")]
+    Quiet,
     /// Nothing more will come from this source.
     #[error("the source ended while reading {what}")]
     Lost {
@@ -32,13 +38,24 @@ pub enum SourceError {
     },
 }
 
+/// The driver marked a frame as damaged: the bytes are not what the camera saw.
+#[derive(Debug, thiserror::Error)]
+#[error("camera {camera}: the driver gave frame {seq} as damaged")]
+pub struct CameraError {
+    /// Which camera.
+    pub camera: CameraId,
+    /// The frame's number.
+    pub seq: u64,
+}
+
 impl SourceError {
-    /// The counter of a lost frame; `None` when the whole source is gone.
+    /// The counter of a lost frame; `None` when none was lost or the whole source is gone.
     #[must_use]
     pub fn reason(&self) -> Option<Reason> {
         match self {
             Self::Frame(error) => Some(error.reason()),
-            Self::Lost { .. } => None,
+            Self::Camera(_) => Some(Reason::DamagedBuffer),
+            Self::Quiet | Self::Lost { .. } => None,
         }
     }
 }

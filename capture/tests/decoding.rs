@@ -75,6 +75,27 @@ fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
+/// The colours that BT.601's own matrix makes of the primaries in limited range (Y, U, V), pure to three in 255.
+#[test]
+fn colours_come_back_from_yuv() {
+    for ([y, u, v], expected) in [
+        ([81, 90, 240], [255, 0, 0]),
+        ([145, 54, 34], [0, 255, 0]),
+        ([41, 240, 110], [0, 0, 255]),
+        ([235, 128, 128], [255, 255, 255]),
+        ([16, 128, 128], [0, 0, 0]),
+    ] {
+        let of = |format, stride, bytes: Vec<u8>| {
+            decode(&Frame { format, width: 2, height: 2, stride, bytes: bytes.into(), ..frame(0) }).expect("decodes")
+        };
+        let yuyv = of(PixelFormat::Yuyv, 4, [y, u, y, v, y, u, y, v].to_vec());
+        assert_eq!(yuyv, of(PixelFormat::Nv12, 2, [y, y, y, y, u, v].to_vec()));
+        for pixel in yuyv.pixels() {
+            assert!(pixel.0.iter().zip(expected).all(|(found, e): (&u8, u8)| found.abs_diff(e) <= 3), "{pixel:?}");
+        }
+    }
+}
+
 #[test]
 fn photos_are_told_by_their_first_bytes() {
     let same = |bytes: &[u8]| difference(&decode_photo(bytes).expect("decodes"), &picture(5));
@@ -111,6 +132,31 @@ proptest! {
             format: PixelFormat::Rgb24, width, height, stride: width * 3 + gap, bytes: bytes.into(), ..frame(0)
         };
         prop_assert_eq!(decode(&frame).expect("decodes"), image);
+    }
+
+    /// Grey pictures through each layout, whatever the padding: what is grey has neither U nor V.
+    #[test]
+    fn grey_pictures_come_back_from_every_raw_format(
+        width in 1u32..20, height in 1u32..20, gap in 0u32..9, seed in any::<u8>()
+    ) {
+        let grey = |x: u32, y: u32| (x * 7 + y * 13) as u8 ^ seed;
+        // Luma of BT.601 in limited range, 16 to 235.
+        let luma = |x, y| (16.0 + 219.0 / 255.0 * f64::from(grey(x, y))).round() as u8;
+        for format in [PixelFormat::Yuyv, PixelFormat::Nv12, PixelFormat::Grey] {
+            let stride = format.row_bytes(width) as u32 + gap;
+            let rows = if format == PixelFormat::Nv12 { height + height.div_ceil(2) } else { height };
+            let bytes = (0..rows).flat_map(|y| (0..stride).map(move |at| (at, y))).map(|(at, y)| match format {
+                PixelFormat::Grey => grey(at, y),
+                PixelFormat::Yuyv if at % 2 == 0 => luma(at / 2, y),
+                PixelFormat::Nv12 if y < height => luma(at, y),
+                _ => 128,
+            });
+            let bytes: Vec<u8> = bytes.collect();
+            let decoded = decode(&Frame { format, width, height, stride, bytes: bytes.into(), ..frame(0) });
+            for (x, y, pixel) in decoded.expect("decodes").enumerate_pixels() {
+                prop_assert!(pixel.0.iter().all(|c| c.abs_diff(grey(x, y)) <= 1), "{format} {x} {y}: {pixel:?}");
+            }
+        }
     }
 
     /// Damage gives an image or an error, never a panic.

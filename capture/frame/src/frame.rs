@@ -23,6 +23,48 @@ pub enum PixelFormat {
     Jpeg,
     /// 8-bit R, G, B, rows of `stride` bytes.
     Rgb24,
+    /// Y, U, Y, V for each two pixels, rows of `stride` bytes.
+    Yuyv,
+    /// Rows of Y, `stride` bytes each, then half as many rows of U, V for each two by two pixels.
+    Nv12,
+    /// 8-bit grey, rows of `stride` bytes.
+    Grey,
+}
+
+impl PixelFormat {
+    /// Every format, in the order in which a camera's are tried: those that need the least of a USB bus first.
+    pub const ALL: [Self; 5] = [Self::Jpeg, Self::Nv12, Self::Yuyv, Self::Rgb24, Self::Grey];
+
+    /// The name in files and configurations.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Jpeg => "jpeg",
+            Self::Rgb24 => "rgb24",
+            Self::Yuyv => "yuyv",
+            Self::Nv12 => "nv12",
+            Self::Grey => "grey",
+        }
+    }
+
+    /// Bytes of the pixels in one row of the first plane; 0 where rows are compressed.
+    #[must_use]
+    pub const fn row_bytes(self, width: u32) -> usize {
+        let width = width as usize;
+        match self {
+            Self::Jpeg => 0,
+            Self::Rgb24 => 3 * width,
+            Self::Yuyv => 4 * width.div_ceil(2),
+            Self::Nv12 => 2 * width.div_ceil(2),
+            Self::Grey => width,
+        }
+    }
+}
+
+impl std::fmt::Display for PixelFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
 }
 
 /// One exposure as the camera gave it: bytes are not decoded until the gate asks.

@@ -3,6 +3,7 @@
 mod error;
 mod jpeg;
 mod png;
+mod raw;
 
 use demeter_frame::{Frame, Intrinsics, PixelFormat, Rgb};
 
@@ -21,7 +22,7 @@ pub fn decode(frame: &Frame) -> Result<Rgb, DecodeError> {
     }
     match frame.format {
         PixelFormat::Jpeg => jpeg::decode(&frame.bytes, Some((frame.width, frame.height))),
-        PixelFormat::Rgb24 => rgb24(frame),
+        _ => raw::decode(frame),
     }
 }
 
@@ -37,22 +38,6 @@ pub fn decode_photo(bytes: &[u8]) -> Result<Rgb, DecodeError> {
     } else {
         jpeg::decode(bytes, None)
     }
-}
-
-/// Rows of `stride` bytes, of which the first 3 * width are pixels; the last row may end with its pixels.
-fn rgb24(frame: &Frame) -> Result<Rgb, DecodeError> {
-    within_bounds(frame.width, frame.height)?;
-    let row = frame.width as usize * 3;
-    let stride = frame.stride as usize;
-    if stride < row {
-        return Err(DecodeError::Stride { expected: row, found: stride });
-    }
-    let expected = stride * (frame.height as usize - 1) + row;
-    if frame.bytes.len() < expected {
-        return Err(DecodeError::Truncated { expected: Some(expected), found: frame.bytes.len() });
-    }
-    let pixels = frame.bytes.chunks(stride).take(frame.height as usize).flat_map(|line| &line[..row]).copied();
-    Ok(raster(frame.width, frame.height, pixels.collect()))
 }
 
 /// Refuses an empty image and one of more than [`MAX_PIXELS`] or [`Intrinsics::MAX_SIDE`].

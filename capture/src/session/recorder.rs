@@ -95,6 +95,7 @@ impl Recorder {
         let ending = match frame.format {
             PixelFormat::Jpeg => "jpg",
             PixelFormat::Rgb24 => "rgb",
+            raw => raw.name(),
         };
         let file = format!("{FRAMES}/{}-{:08}.{ending}", frame.camera, frame.seq);
         if frame.bytes.len() as u64 > MAX_FRAME_BYTES {

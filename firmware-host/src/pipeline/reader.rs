@@ -49,11 +49,14 @@ pub(super) fn read(run: &Run<'_>, source: &mut dyn Source, to: &Sender<Arrival>)
                     message: chain(&refusal),
                 },
             },
-            Err(error @ SourceError::Lost { .. }) => return (gate.counts().clone(), Some(chain(&error))),
-            Err(SourceError::Frame(error)) => {
-                gate.count(error.reason());
-                Arrival::Refused { frame: None, reason: error.reason().name(), message: chain(&error) }
-            }
+            Err(SourceError::Quiet) => continue,
+            Err(error) => match error.reason() {
+                Some(reason) => {
+                    gate.count(reason);
+                    Arrival::Refused { frame: None, reason: reason.name(), message: chain(&error) }
+                }
+                None => return (gate.counts().clone(), Some(chain(&error))),
+            },
         };
         drop(working);
         if to.blocking_send(arrival).is_err() {
