@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 use crate::commands::{
-    decode, doctor, edit, eval, fit, import, learn, models, photo, plants, replay, run, species, synth,
+    camera, decode, doctor, edit, eval, fit, import, learn, models, photo, plants, replay, run, species, synth,
 };
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
@@ -25,6 +25,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// List cameras, look through one, record them.
+    Camera(camera::Args),
     /// Turn a record back into its plant.
     Decode(decode::Args),
     /// Measure the method: tables of figures beside their goals.
@@ -58,6 +60,7 @@ enum Command {
 impl Command {
     fn run(&self, output: &Output) -> Result<Exit, CommandError> {
         match self {
+            Self::Camera(args) => camera::run(args, output),
             Self::Decode(args) => decode::run(args, output),
             Self::Eval(args) => eval::run(args, output),
             Self::Fit(args) => fit::run(args, output),

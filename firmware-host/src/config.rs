@@ -10,10 +10,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+pub use camera::CameraConfig;
 pub use lamp::LampConfig;
 pub use thermal::ThermalConfig;
 
 use crate::error::CommandError;
+
+pub mod camera;
 
 /// Where the service keeps its configuration; read when it is there and no other is named.
 const DEFAULT_PATH: &str = "/etc/demeter/demeter.toml";
@@ -37,6 +40,8 @@ pub struct Config {
     pub lamp: LampConfig,
     /// Where frames come from; without it stored plants are served and nothing else.
     pub source: Option<SourceConfig>,
+    /// The rig's cameras.
+    pub cameras: Vec<CameraConfig>,
 }
 
 /// `[store]`.
@@ -236,7 +241,18 @@ impl Config {
                 found: format!("{:?}", config.models.mask),
             });
         }
+        if let Some((key, expected, found)) = config.wrong_camera() {
+            return Err(ConfigError::Value { path: path.into(), key, expected, found });
+        }
         Ok(config)
+    }
+
+    fn wrong_camera(&self) -> Option<camera::BadValue> {
+        let ids: std::collections::BTreeSet<_> = self.cameras.iter().map(|camera| &camera.id).collect();
+        if ids.len() != self.cameras.len() {
+            return Some(("cameras.id", "a name of its own for each camera", format!("{ids:?}")));
+        }
+        self.cameras.iter().find_map(|camera| camera.check().err())
     }
 }
 
@@ -252,6 +268,8 @@ fn suggestion(message: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const LEFT: &str = "[[cameras]]\nid = 'left'\ndevice = 'usb-1'\nhfov_deg = 60\nheight_m = 1\ntilt_deg = -100";
 
     fn read(text: &str) -> Result<Config, String> {
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -279,7 +297,10 @@ mod tests {
         for (text, parts) in [
             ("[stroe]\npath = 'x'", &["stroe", "did you mean `store`?"][..]),
             ("[api]\nlistn = '127.0.0.1:1'", &["listn", "did you mean `listen`?"]),
-            ("[harvester]", &["harvester", "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `source`"]),
+            ("[harvester]", &["harvester", "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `source`, `cameras`"]),
+            ("[[cameras]]\nid = 'left'", &["missing field `device`"]),
+            (LEFT, &["cameras.tilt_deg", "-90 to 90", "-100"]),
+            ("[[cameras]]\nid = 'left'\ndevise = 'usb'", &["devise", "did you mean `device`?"]),
             ("[store]\npath = 5", &["path = 5", "integer", "expected"]),
             ("[api]\nlisten = 'here'", &["listen = 'here'", "address"]),
             ("[api]\nlisten = '0.0.0.0:8420'", &["api.listen", "loopback", "0.0.0.0:8420"]),

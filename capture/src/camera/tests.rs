@@ -47,11 +47,11 @@ impl Stream for Playing {
         match self.0.front().copied() {
             Some(Act::Hang) => {
                 std::thread::sleep(wait);
-                return Ok(None);
+                Ok(None)
             }
             Some(Act::Panic) => panic!("as asked for"),
             Some(Act::Vanish) | None => {
-                return Err(CameraFault::Refused { what: "fetching", source: std::io::ErrorKind::NotFound.into() });
+                Err(CameraFault::Refused { what: "fetching", source: std::io::ErrorKind::NotFound.into() })
             }
             Some(Act::Frame(count)) => {
                 self.0.pop_front();

@@ -27,7 +27,8 @@ pub(super) fn set(device: &v4l::Device, mode: &Mode) -> Result<Layout, CameraFau
         device.set_params(&Parameters::new(interval)).map_err(CameraFault::refused("setting the rate"))?.interval;
     let rate = f64::from(given.denominator) / f64::from(given.numerator);
     // A driver that says nothing of its rate (0/0) is not a number.
-    if !((rate / mode.rate - 1.0).abs() <= RATE_TOLERANCE) {
+    let kept = (rate / mode.rate - 1.0).abs() <= RATE_TOLERANCE;
+    if !kept {
         return Err(wrong(format!("{rate:.3} frames a second")));
     }
     let stride = if mode.format == PixelFormat::Jpeg { 0 } else { stride };

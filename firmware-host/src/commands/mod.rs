@@ -1,5 +1,6 @@
 //! One file a command: its arguments and what it does with them.
 
+pub mod camera;
 pub mod decode;
 pub mod doctor;
 pub mod edit;

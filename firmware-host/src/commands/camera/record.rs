@@ -1,0 +1,146 @@
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use demeter_capture::{CameraHealth, Cameras, Recorder, Source, SourceError};
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use super::pick::Pick;
+use crate::config::camera::manifest;
+use crate::error::{CommandError, Exit, chain};
+use crate::files;
+use crate::output::Output;
+
+/// Arguments of `demeter camera record`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    pick: Pick,
+    /// How fast the rig drives along the row, metres a second: each frame's pose follows from it. Negative when the row
+    /// passes from left to right.
+    #[arg(long, allow_negative_numbers = true, value_parser = speed)]
+    speed: f64,
+    /// The crop.
+    #[arg(long, default_value = "soybean")]
+    species: String,
+    /// Name of the rig.
+    #[arg(long, default_value = "rig")]
+    rig: String,
+    /// Stop after so many frames.
+    #[arg(long)]
+    frames: Option<u64>,
+    /// Stop after so many seconds; without this and --frames Ctrl-C stops.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    seconds: Option<u64>,
+    /// The session's folder; it must not hold a session yet.
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+/// What was recorded.
+#[derive(Serialize)]
+struct Summary {
+    session: String,
+    frames: u64,
+    /// Frames that no reader would have taken back.
+    unrecorded: u64,
+    cameras: Vec<CameraHealth>,
+}
+
+pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
+    let cameras = args.pick.cameras()?;
+    // A recording for a crop that nothing can replay would be found out too late.
+    files::species(&args.species)?;
+    let session = format!("rec-{}", jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ"));
+    let failed = |error: &dyn std::error::Error| CommandError::failed("session", error);
+    let manifest = manifest(&cameras, &args.species, &args.rig, &session);
+    let mut recorder = Recorder::create(&args.output, manifest).map_err(|error| failed(&error))?;
+    let stop = interrupted()?;
+    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(args.speed)).collect();
+    let mut source = Cameras::open(&settings).map_err(|error| CommandError::failed("camera", &error))?;
+    let health = source.health();
+    let bar = args.frames.map_or_else(ProgressBar::no_length, ProgressBar::new);
+    let deadline = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
+    let (mut frames, mut unrecorded) = (0, 0);
+    let over = |frames| {
+        let late = deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        late || args.frames.is_some_and(|most| frames >= most) || stop.load(Ordering::Relaxed)
+    };
+    while !over(frames) {
+        match source.next() {
+            Ok(Some(frame)) => match recorder.write(&frame) {
+                Ok(()) => {
+                    frames += 1;
+                    bar.inc(1);
+                }
+                Err(error @ demeter_capture::SessionError::Frame { .. }) => {
+                    unrecorded += 1;
+                    tracing::warn!("{}", chain(&error));
+                }
+                Err(error) => return Err(failed(&error)),
+            },
+            Ok(None) => break,
+            // The health counts them.
+            Err(SourceError::Quiet | SourceError::Camera(_) | SourceError::Frame(_)) => {}
+            Err(error @ SourceError::Lost { .. }) => return Err(CommandError::failed("camera", &error)),
+        }
+    }
+    bar.finish_and_clear();
+    let cameras = health.read();
+    drop(source);
+    recorder.finish().map_err(|error| failed(&error))?;
+    let whole = |camera: &CameraHealth| camera.frames > 0 && camera.missed + camera.dropped + camera.damaged == 0;
+    let done = unrecorded == 0 && cameras.iter().all(whole);
+    report(&Summary { session, frames, unrecorded, cameras }, output)?;
+    Ok(if done { Exit::Done } else { Exit::Partial })
+}
+
+fn report(summary: &Summary, output: &Output) -> Result<(), CommandError> {
+    if output.json {
+        return output.json(summary);
+    }
+    let mut text = format!("{} frames in session {}\n", summary.frames, summary.session);
+    for camera in &summary.cameras {
+        let CameraHealth { id, frames, damaged, missed, dropped, reopened, .. } = camera;
+        text += &format!(
+            "{id}: {frames} came, {missed} missed, {damaged} damaged, {dropped} dropped, {reopened} times reopened\n"
+        );
+        if let (0, Some(error)) = (frames, &camera.last_error) {
+            text += &format!("{id}: {error}\n");
+        }
+    }
+    output.text(&text)
+}
+
+/// Set when Ctrl-C or SIGTERM says to stop, so that the session is closed properly.
+fn interrupted() -> Result<Arc<AtomicBool>, CommandError> {
+    let failed = |error: std::io::Error| CommandError::failed("runtime", &error);
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build().map_err(failed)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let said = stop.clone();
+    std::thread::spawn(move || {
+        runtime.block_on(async {
+            use tokio::signal::unix::{SignalKind, signal};
+            let (Ok(mut interrupt), Ok(mut terminate)) =
+                (signal(SignalKind::interrupt()), signal(SignalKind::terminate()))
+            else {
+                return;
+            };
+            tokio::select! {
+                _ = interrupt.recv() => {}
+                _ = terminate.recv() => {}
+            }
+            said.store(true, Ordering::Relaxed);
+        });
+    });
+    Ok(stop)
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.abs() <= 20.0 => Ok(x),
+        _ => Err("expected metres a second from -20 to 20".into()),
+    }
+}
