@@ -1,5 +1,5 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup build demo check fmt bench evaluation train species layouts
+.PHONY: setup build demo check soak fmt bench evaluation train species layouts
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
 TRAINING := .cache/training
@@ -23,6 +23,10 @@ demo: build
 # Format, lints, dependency rules, every test.
 check:
 	@tools/check.sh
+
+# What takes too long or measures too much for `make check`: half an hour.
+soak:
+	@tools/soak.sh
 
 fmt:
 	cargo fmt --all

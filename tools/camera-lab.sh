@@ -14,7 +14,7 @@ flock 9
 # Debian's `cam` is run inside the guest out of this machine's file system.
 if ! command -v cam >/dev/null; then
     apt-get update -qq
-    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends libcamera-tools
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends libcamera-tools libcamera-ipa
 fi
 if [ ! -s "$cache/root.img" ]; then
     echo "camera-lab: making $cache/root.img" >&2

@@ -5,7 +5,7 @@ use image::imageops;
 use serde::{Deserialize, Serialize};
 
 use crate::order::Order;
-use crate::{Counts, DecodeError, Reason, decode};
+use crate::{Counts, DecodeError, Lens, LensWatch, Reason, decode};
 
 /// What the gate asks of an image. Luma runs from 0 to 255.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,6 +80,7 @@ pub struct Gate {
 struct Memory {
     order: Order,
     bytes: Option<blake3::Hash>,
+    lens: LensWatch,
 }
 
 impl Gate {
@@ -96,6 +97,7 @@ impl Gate {
     pub fn admit(&mut self, frame: &Frame) -> Result<Rgb, Refusal> {
         let admitted = self.arrival(frame).map_err(Refusal::Judged).and_then(|()| {
             let rgb = decode(frame)?;
+            self.watch(frame, &rgb);
             look(&self.config, &rgb).map_err(Refusal::Judged)?;
             Ok(rgb)
         });
@@ -105,6 +107,7 @@ impl Gate {
 
     /// The same for a frame that was decoded elsewhere into `rgb`.
     pub fn judge(&mut self, frame: &Frame, rgb: &Rgb) -> Verdict {
+        self.watch(frame, rgb);
         let refused = self.arrival(frame).and_then(|()| look(&self.config, rgb)).err();
         self.tally(refused);
         refused.map_or(Verdict::Pass, Verdict::Refuse)
@@ -119,6 +122,22 @@ impl Gate {
     #[must_use]
     pub fn counts(&self) -> &Counts {
         &self.counts
+    }
+
+    /// What the pictures say of each camera's lens.
+    #[must_use]
+    pub fn lenses(&self) -> BTreeMap<&CameraId, Lens> {
+        self.cameras.iter().map(|(id, memory)| (id, memory.lens.state())).collect()
+    }
+
+    /// Dirt costs no frame: the parts of the picture beside it are as good as ever. It is said once.
+    fn watch(&mut self, frame: &Frame, rgb: &Rgb) {
+        let lens = &mut self.cameras.entry(frame.camera.clone()).or_default().lens;
+        if lens.is_due(frame.stamp.mono_ns)
+            && let Some(news) = lens.see(frame.stamp.mono_ns, rgb)
+        {
+            tracing::warn!("camera {}: {news}", frame.camera);
+        }
     }
 
     fn tally(&mut self, refused: Option<Reason>) {

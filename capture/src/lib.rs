@@ -7,9 +7,9 @@
 //!              └──── Reason ◄────────┘   one counter each, in Counts
 //! ```
 //!
-//! Start at [`Source`]: whatever gives frames is one. [`Replay`] gives those of a recorded session, [`Recorder`] writes
-//! such a session, and [`Manifest`] is its `session.toml`. [`Gate::admit`] puts a frame in order, decodes it ([`decode`])
-//! and looks at exposure and sharpness. A frame that is no good ends in exactly one [`Reason`] and the run goes on; only
+//! Start at [`Source`]: whatever gives frames is one. [`Cameras`] gives those of the rig's cameras, opened again whatever
+//! happens to them; [`Replay`] gives those of a recorded session, [`Recorder`] writes such a session, and [`Manifest`] is its `session.toml`. [`Gate::admit`] puts a frame in order, decodes it ([`decode`])
+//! and looks at exposure, sharpness and, over time, the lens ([`LensWatch`]). A frame that is no good ends in exactly one [`Reason`] and the run goes on; only
 //! a broken recording as a whole ([`SessionError`]) or a source that is gone ([`SourceError::Lost`]) stops it.
 //!
 //! Spec: appliance.md "Data path", "Cameras", "A recorded session"; reliability.md 23 and 24. The crate knows no network,
@@ -20,6 +20,7 @@
 mod camera;
 mod counts;
 mod gate;
+mod lens;
 mod libcamera;
 mod order;
 mod pixels;
@@ -33,6 +34,7 @@ pub use camera::{
 };
 pub use counts::{Counts, Reason};
 pub use gate::{Gate, GateConfig, Refusal, Verdict};
+pub use lens::{Lens, LensWatch};
 pub use pixels::{DecodeError, MAX_PIXELS, decode, decode_photo};
 pub use session::{
     FileFault, FrameError, FrameFault, MAX_FRAME_BYTES, Manifest, ManifestError, Pace, Recorder, Replay, Row,

@@ -119,3 +119,21 @@ impl Done {
         self.console
     }
 }
+
+/// Bash that records in the background and waits for things to happen: `start NAME "OPTIONS"` begins session NAME with
+/// its log in NAME.log, `frames NAME COUNT` waits until it holds so many frames, `said NAME TEXT [COUNT]` until its log
+/// says so, `finish NAME` ends it and leaves the summary in NAME.json.
+pub const RECORDING: &str = r#"
+start() {
+    demeter camera record $2 --json --speed 0.5 -o $1 >$1.json 2>$1.log &
+    recorder=$!
+}
+wait_for() {
+    for _ in $(seq 200); do eval "$1" && return 0; sleep 0.1; done
+    echo "waited in vain: $1"; cat *.log; return 1
+}
+frames() { wait_for "[ \$(cat $1/index.jsonl 2>/dev/null | wc -l) -ge $2 ]"; }
+said() { wait_for "[ \$(grep -c '$2' $1.log) -ge ${3:-1} ]"; }
+# Exit status 3 means that a frame was lost, which is what most tests are about.
+finish() { kill -INT $recorder; wait $recorder || [ $? = 3 ]; }
+"#;

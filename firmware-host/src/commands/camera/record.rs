@@ -1,9 +1,11 @@
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use demeter_capture::{CameraHealth, Cameras, Recorder, Source, SourceError};
+use demeter_capture::{CameraHealth, Cameras, LensWatch, Recorder, SessionError, Source, SourceError, decode};
+use demeter_frame::{CameraId, Frame};
 use indicatif::ProgressBar;
 use serde::Serialize;
 
@@ -64,6 +66,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let bar = args.frames.map_or_else(ProgressBar::no_length, ProgressBar::new);
     let deadline = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
     let (mut frames, mut unrecorded) = (0, 0);
+    let mut lenses = BTreeMap::<CameraId, LensWatch>::new();
     let over = |frames| {
         let late = deadline.is_some_and(|deadline| Instant::now() >= deadline);
         late || args.frames.is_some_and(|most| frames >= most) || stop.load(Ordering::Relaxed)
@@ -74,8 +77,9 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
                 Ok(()) => {
                     frames += 1;
                     bar.inc(1);
+                    watch(lenses.entry(frame.camera.clone()).or_default(), &frame);
                 }
-                Err(error @ demeter_capture::SessionError::Frame { .. }) => {
+                Err(error @ SessionError::Frame { .. }) => {
                     unrecorded += 1;
                     tracing::warn!("{}", chain(&error));
                 }
@@ -95,6 +99,17 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let done = unrecorded == 0 && cameras.iter().all(whole);
     report(&Summary { session, frames, unrecorded, cameras }, output)?;
     Ok(if done { Exit::Done } else { Exit::Partial })
+}
+
+/// Says when a lens gets dirty or is covered: an hour of such pictures would be found out too late.
+fn watch(lens: &mut LensWatch, frame: &Frame) {
+    let due = lens.is_due(frame.stamp.mono_ns);
+    // What cannot be decoded is for the replay's gate to count.
+    if let Some(picture) = due.then(|| decode(frame).ok()).flatten()
+        && let Some(news) = lens.see(frame.stamp.mono_ns, &picture)
+    {
+        tracing::warn!("camera {}: {news}", frame.camera);
+    }
 }
 
 fn report(summary: &Summary, output: &Output) -> Result<(), CommandError> {
