@@ -40,7 +40,7 @@ pub struct Config {
     pub lamp: LampConfig,
     /// Where frames come from; without it stored plants are served and nothing else.
     pub source: Option<SourceConfig>,
-    /// The rig's cameras.
+    /// The rig's cameras, which a source of the kind `cameras` reads.
     pub cameras: Vec<CameraConfig>,
 }
 
@@ -124,6 +124,14 @@ pub enum SourceConfig {
         /// The same seed gives the same row.
         #[serde(default)]
         seed: u64,
+    },
+    /// The cameras of `[[cameras]]`.
+    Cameras {
+        /// The crop: a species that ships.
+        #[serde(default = "soybean")]
+        species: String,
+        /// How fast the rig drives, metres a second; negative when the row passes from left to right.
+        speed_m_per_s: f64,
     },
 }
 
@@ -249,6 +257,15 @@ impl Config {
 
     fn wrong_camera(&self) -> Option<camera::BadValue> {
         let ids: std::collections::BTreeSet<_> = self.cameras.iter().map(|camera| &camera.id).collect();
+        if let Some(SourceConfig::Cameras { speed_m_per_s, .. }) = &self.source {
+            if self.cameras.is_empty() {
+                return Some(("cameras", "at least one [[cameras]] for a source of this kind", "none".into()));
+            }
+            if !(-20.0..=20.0).contains(speed_m_per_s) {
+                let found = speed_m_per_s.to_string();
+                return Some(("source.speed_m_per_s", "-20 to 20 metres a second", found));
+            }
+        }
         if ids.len() != self.cameras.len() {
             return Some(("cameras.id", "a name of its own for each camera", format!("{ids:?}")));
         }
@@ -297,8 +314,12 @@ mod tests {
         for (text, parts) in [
             ("[stroe]\npath = 'x'", &["stroe", "did you mean `store`?"][..]),
             ("[api]\nlistn = '127.0.0.1:1'", &["listn", "did you mean `listen`?"]),
-            ("[harvester]", &["harvester", "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `source`, `cameras`"]),
+            (
+                "[harvester]",
+                &["harvester", "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `source`, `cameras`"],
+            ),
             ("[[cameras]]\nid = 'left'", &["missing field `device`"]),
+            ("[source]\nkind = 'cameras'\nspeed_m_per_s = 1", &["cameras", "at least one", "none"]),
             (LEFT, &["cameras.tilt_deg", "-90 to 90", "-100"]),
             ("[[cameras]]\nid = 'left'\ndevise = 'usb'", &["devise", "did you mean `device`?"]),
             ("[store]\npath = 5", &["path = 5", "integer", "expected"]),
@@ -311,7 +332,7 @@ mod tests {
             ("[store]\nmin_free_mib = -1", &["-1", "expected u64"]),
             ("[models]\nmasks = ['a']", &["masks", "did you mean `mask`?"]),
             ("[models]\ndepth = ['a']", &["depth", "string"]),
-            ("[source]\nkind = 'camera'", &["camera", "`replay`"]),
+            ("[source]\nkind = 'camera'", &["camera", "`replay`", "`cameras`"]),
             ("[source]\nkind = 'replay'\nsesion = 'x'", &["sesion", "did you mean `session`?"]),
             ("[source]\nkind = 'synthetic'\nplants = -1", &["-1", "expected u16"]),
             ("[store", &["line 1"]),

@@ -1,5 +1,6 @@
 //! What the daemon says about itself, on the page, through the API and by the lamp.
 
+use demeter_capture::CameraHealth;
 use serde::Serialize;
 
 use crate::daemon::disk::Room;
@@ -18,6 +19,8 @@ pub struct Status {
     pub reasons: Vec<Reason>,
     /// The pipeline's stages; empty while none runs.
     pub stages: Vec<Stage>,
+    /// The rig's cameras; empty while they are no source.
+    pub cameras: Vec<CameraHealth>,
     /// Live frames dropped since the source started, because the box was busy.
     pub frames_dropped: u64,
     /// The wall clock is set by something that knows the time.

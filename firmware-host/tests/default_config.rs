@@ -30,9 +30,9 @@ fn as_it_is_installed_it_is_the_default() {
 #[test]
 fn every_line_may_be_taken_out_of_its_comment_and_the_defaults_it_tells_are_true() {
     let all = load(&uncommented(|_| true)).unwrap();
-    assert!(all.source.is_some() && all.lamp.path.is_some() && all.lamp.buzzer.is_some());
+    assert!(all.cameras.len() == 1 && all.source.is_some() && all.lamp.path.is_some() && all.lamp.buzzer.is_some());
     // What has no default is an example.
-    let examples = Config { source: None, lamp: LampConfig::default(), ..all };
+    let examples = Config { source: None, cameras: Vec::new(), lamp: LampConfig::default(), ..all };
     assert_eq!(examples, Config::default());
     // Each key alone, where its table is not a comment itself.
     let source = FILE.lines().position(|line| line == "#[source]").unwrap();
@@ -46,6 +46,8 @@ fn it_names_every_key_that_there_is() {
     let full: toml::Table = uncommented(|_| true).parse().unwrap();
     let mut tables = vec![(String::new(), keys(&full))];
     for (name, value) in &full {
+        let camera = value.as_array().and_then(|cameras| cameras.first()?.as_table());
+        tables.extend(camera.map(|camera| (format!("[[{name}]]\n"), keys(camera))));
         tables.extend(value.as_table().map(|table| (format!("[{name}]\n"), keys(table))));
     }
     for (header, told) in tables {

@@ -181,8 +181,8 @@ fn what_the_webcam_sees_of_a_row_becomes_its_plants() {
     let Some(lab) = lab("what_the_webcam_sees_of_a_row_becomes_its_plants") else { return };
     let row = lab.path("row");
     // Sixty pictures along 7 plants: more than are recorded, so the film does not begin anew while it is.
-    let grown = demeter().args(["synth", "session", "--plants", "7", "--frames", "60", "--seed", "5", "-o"]).arg(&row);
-    assert!(grown.output().unwrap().status.success());
+    let plan = ["synth", "session", "--plants", "7", "--frames", "60", "--seed", "5", "-o"];
+    assert!(demeter().args(plan).arg(&row).output().unwrap().status.success());
     film(&row, &lab.path("frames.mjpg"));
     let truth: Value = serde_json::from_slice(&std::fs::read(row.join("truth.json")).unwrap()).unwrap();
     let poses = std::fs::read_to_string(row.join("poses.jsonl")).unwrap();

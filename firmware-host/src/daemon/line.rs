@@ -5,12 +5,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
-use demeter_capture::{Manifest, Pace, Replay, Source};
+use demeter_capture::{Cameras, Manifest, Pace, Replay, Source};
 use demeter_frame::Intrinsics;
 use demeter_recon::world::Row;
 
 use crate::clock::{Clock, SystemClock};
-use crate::config::{ModelsConfig, SourceConfig};
+use crate::config::{CameraConfig, ModelsConfig, SourceConfig, camera};
 use crate::error::CommandError;
 use crate::eye::Eye;
 use crate::files;
@@ -30,6 +30,8 @@ const SYNTHETIC_ROW: (f64, f64) = (0.35, 0.25);
 #[derive(Debug)]
 pub(super) struct Line {
     pub(super) source: SourceConfig,
+    /// The rig's cameras.
+    pub(super) cameras: Vec<CameraConfig>,
     pub(super) models: ModelsConfig,
     pub(super) store: Arc<Store>,
     pub(super) clock: Arc<SystemClock>,
@@ -70,14 +72,16 @@ impl Line {
         let (mut source, manifest) = match &self.source {
             SourceConfig::Replay { session } => replay(session)?,
             SourceConfig::Synthetic { species, plants, seed } => self.synthetic(species, *plants, *seed)?,
+            SourceConfig::Cameras { species, speed_m_per_s } => self.live(species, *speed_m_per_s, control)?,
         };
+        let live = matches!(self.source, SourceConfig::Cameras { .. });
         let species = files::species(&manifest.species)?;
         let loading = control.looker.work();
         // One thread for the network: the other core decodes and fits.
         let mut eye = Eye::open(&self.models, NonZeroUsize::MIN).map_err(CommandError::from)?;
         drop(loading);
         let (store, clock) = (&*self.store, &*self.clock);
-        let run = Run { manifest: &manifest, species: &species, store, control, clock, live: false };
+        let run = Run { manifest: &manifest, species: &species, store, control, clock, live };
         let outcome = pipeline::run(&run, &mut *source, &mut eye, |progress| match progress {
             Progress::Frame => metrics::counter!("demeter_frames_total").increment(1),
             Progress::Plant(_) => metrics::counter!("demeter_plants_stored_total").increment(1),
@@ -93,6 +97,13 @@ impl Line {
     fn session_id(&self) -> String {
         let boot = self.clock.boot_id().get(..8).unwrap_or("unknown");
         format!("{}-{boot}-{}", self.rig, self.clock.now().mono_ns / 1_000_000)
+    }
+
+    fn live(&self, species: &str, speed: f64, control: &Control) -> Result<(Box<dyn Source>, Manifest), CommandError> {
+        let settings: Vec<_> = self.cameras.iter().map(|camera| camera.settings(speed)).collect();
+        let cameras = Cameras::open(&settings).map_err(|error| CommandError::failed("camera", &error))?;
+        control.show_cameras(cameras.health());
+        Ok((Box::new(cameras), camera::manifest(&self.cameras, species, &self.rig, &self.session_id())))
     }
 
     fn synthetic(&self, name: &str, plants: u16, seed: u64) -> Result<(Box<dyn Source>, Manifest), CommandError> {

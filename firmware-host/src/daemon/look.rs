@@ -3,6 +3,7 @@
 use std::ops::ControlFlow::{self, Break, Continue};
 use std::time::Instant;
 
+use demeter_capture::{CameraHealth, CameraState};
 use sd_notify::NotifyState;
 use serde_json::json;
 
@@ -45,11 +46,12 @@ impl Daemon {
         let heat = self.thermal.update(now);
         let waiting = self.line.as_ref().is_some_and(|control| control.is_full());
         let disk = self.disk.update(waiting);
-        let (mut stages, mut frames_dropped) = (Vec::new(), 0);
+        let (mut stages, mut cameras, mut frames_dropped) = (Vec::new(), Vec::new(), 0);
         if let Some(control) = &self.line {
             control.slow_down(heat.slowness);
             control.storage_full(disk.full);
             stages = watchdog::stages(control, now);
+            cameras = control.cameras();
             frames_dropped = control.dropped();
         }
         let before = self.status.borrow().clone();
@@ -58,7 +60,7 @@ impl Daemon {
             self.note("load", json!({"heat": heat, "disk": disk}));
         }
         let time_trusted = self.clock.synchronised();
-        let status = Status { stages, frames_dropped, time_trusted, heat, disk, ..before };
+        let status = Status { stages, cameras, frames_dropped, time_trusted, heat, disk, ..before };
         let reasons = self.reasons(&status, self.store_beat.silent(now));
         let health = reasons.first().map_or(Health::Works, |reason| reason.health);
         if watchdog::alive(&status.stages, &self.store_beat, now) {
@@ -92,12 +94,26 @@ impl Daemon {
             broken("stuck", format!("the {} has been at one item for {seconds:.0} s", stage.name))
         };
         let stuck = status.stages.iter().filter(|stage| stage.stuck).map(stuck);
+        let lost = |camera: &CameraHealth| {
+            let why = camera.last_error.as_deref().unwrap_or("no frames");
+            degraded("camera", format!("camera {} gives no frames: {why}", camera.id))
+        };
+        let lost = status.cameras.iter().filter(|camera| camera.state == CameraState::Lost).map(lost);
         let hot = (status.heat.slowness > 1).then(|| {
             let (celsius, part) = (status.heat.celsius.unwrap_or_default(), status.heat.slowness);
             degraded("hot", format!("the box is hot ({celsius:.0} °C) and works 1 second in {part}"))
         });
         let refused = self.refused.clone().map(|why| degraded("configuration", why));
         let dark = self.dark.clone().map(|why| degraded("lamp", why));
-        failed.into_iter().chain(silent).chain(full).chain(stuck).chain(hot).chain(refused).chain(dark).collect()
+        failed
+            .into_iter()
+            .chain(silent)
+            .chain(full)
+            .chain(stuck)
+            .chain(lost)
+            .chain(hot)
+            .chain(refused)
+            .chain(dark)
+            .collect()
     }
 }

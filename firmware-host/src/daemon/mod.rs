@@ -201,6 +201,7 @@ impl Daemon {
         };
         let line = Line {
             source,
+            cameras: self.config.cameras.clone(),
             models: self.config.models.clone(),
             store: self.store.clone(),
             clock: self.clock.clone(),
@@ -264,7 +265,8 @@ impl Daemon {
         self.disk.configure(config.store.min_free_bytes());
         self.lamp.dark().unwrap_or_else(|error| tracing::warn!("{error}"));
         self.lamp = Lamp::new(&config.lamp);
-        let other_line = (&config.source, &config.models) != (&self.config.source, &self.config.models);
+        let line = |config: &Config| (config.source.clone(), config.models.clone(), config.cameras.clone());
+        let other_line = line(&config) != line(&self.config);
         self.config = config;
         tracing::info!("the configuration was read again");
         self.note("configuration_taken", json!({}));

@@ -2,6 +2,8 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use demeter_capture::{CameraHealth, CamerasHealth};
+
 use super::beat::Beat;
 
 /// How often a stage that rests or waits for room looks whether it may go on.
@@ -23,6 +25,7 @@ pub struct Control {
     /// One part of so many is worked, the others are rested; 0 is 1.
     slowness: AtomicU32,
     full: AtomicBool,
+    cameras: OnceLock<CamerasHealth>,
     /// When everything must have ended; unset while the run goes on.
     deadline: OnceLock<Instant>,
 }
@@ -54,6 +57,17 @@ impl Control {
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// Lets whoever watches see how the cameras do.
+    pub fn show_cameras(&self, health: CamerasHealth) {
+        self.cameras.get_or_init(|| health);
+    }
+
+    /// How the cameras do; empty when frames come from elsewhere.
+    #[must_use]
+    pub fn cameras(&self) -> Vec<CameraHealth> {
+        self.cameras.get().map_or_else(Vec::new, CamerasHealth::read)
     }
 
     /// The stages by name, in the order of the data path.
