@@ -33,7 +33,7 @@ impl Driver for Camera {
         let stream = format!("width={width},height={height},pixelformat={}", name(format));
         let mut child = Command::new(PROGRAM)
             .args(["--camera", &self.0.device, "--stream", &stream, "--strict-formats", "--capture"])
-            .arg("--file=/dev/stdin")
+            .arg("--file=/proc/self/fd/0")
             .stdin(file)
             .stdout(Stdio::piped())
             .stderr(Stdio::inherit())

@@ -132,6 +132,9 @@ pub enum SourceConfig {
         species: String,
         /// How fast the rig drives, metres a second; negative when the row passes from left to right.
         speed_m_per_s: f64,
+        /// Distance from plant to plant as sown, metres: what is seen much nearer belongs to the same plant.
+        #[serde(default)]
+        spacing_m: Option<f64>,
     },
 }
 
@@ -257,13 +260,16 @@ impl Config {
 
     fn wrong_camera(&self) -> Option<camera::BadValue> {
         let ids: std::collections::BTreeSet<_> = self.cameras.iter().map(|camera| &camera.id).collect();
-        if let Some(SourceConfig::Cameras { speed_m_per_s, .. }) = &self.source {
+        if let Some(SourceConfig::Cameras { speed_m_per_s, spacing_m, .. }) = &self.source {
             if self.cameras.is_empty() {
                 return Some(("cameras", "at least one [[cameras]] for a source of this kind", "none".into()));
             }
             if !(-20.0..=20.0).contains(speed_m_per_s) {
                 let found = speed_m_per_s.to_string();
                 return Some(("source.speed_m_per_s", "-20 to 20 metres a second", found));
+            }
+            if let Some(spacing) = spacing_m.filter(|spacing| !(0.01..=10.0).contains(spacing)) {
+                return Some(("source.spacing_m", "0.01 to 10 metres", spacing.to_string()));
             }
         }
         if ids.len() != self.cameras.len() {

@@ -16,3 +16,11 @@ pub mod run;
 pub mod species;
 pub mod synth;
 mod target;
+
+/// Metres from plant to plant, as an argument.
+pub(crate) fn spacing(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if (0.01..=10.0).contains(&x) => Ok(x),
+        _ => Err("expected metres from 0.01 to 10".into()),
+    }
+}

@@ -1,7 +1,9 @@
 //! `[[cameras]]`: the rig's cameras.
 
-use demeter_capture::{Backend, CameraSettings, Controls, Manifest, Mode, Mount, SCHEMA_VERSION, SessionCamera};
-use demeter_capture::{longest_exposure, sampling};
+use demeter_capture::{
+    Backend, CameraSettings, Controls, Manifest, Mode, Mount, Row, SCHEMA_VERSION, SessionCamera, longest_exposure,
+    sampling,
+};
 use demeter_frame::{CameraId, Intrinsics, PixelFormat};
 use serde::Deserialize;
 
@@ -141,9 +143,18 @@ impl CameraConfig {
     }
 }
 
+/// What the cameras drive along.
+#[derive(Clone, Copy, Debug)]
+pub struct Sown<'a> {
+    /// A species that the program knows.
+    pub species: &'a str,
+    /// Distance from plant to plant, metres, where it is known.
+    pub spacing: Option<f64>,
+}
+
 /// The session of these cameras, before its first frame.
 #[must_use]
-pub fn manifest(cameras: &[CameraConfig], species: &str, rig_id: &str, session_id: &str) -> Manifest {
+pub fn manifest(cameras: &[CameraConfig], sown: Sown<'_>, rig_id: &str, session_id: &str) -> Manifest {
     let camera = |camera: &CameraConfig| SessionCamera {
         id: CameraId(camera.id.clone()),
         height_above_ground_m: Some(camera.height_m),
@@ -154,8 +165,8 @@ pub fn manifest(cameras: &[CameraConfig], species: &str, rig_id: &str, session_i
         schema_version: SCHEMA_VERSION,
         rig_id: rig_id.into(),
         session_id: session_id.into(),
-        species: species.into(),
+        species: sown.species.into(),
         cameras: cameras.iter().map(camera).collect(),
-        rows: Vec::new(),
+        rows: vec![Row { row: "1".into(), plot: None, plant_spacing_m: sown.spacing }],
     }
 }

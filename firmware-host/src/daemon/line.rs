@@ -10,7 +10,8 @@ use demeter_frame::Intrinsics;
 use demeter_recon::world::Row;
 
 use crate::clock::{Clock, SystemClock};
-use crate::config::{CameraConfig, ModelsConfig, SourceConfig, camera};
+use crate::config::camera::{self, CameraConfig, Sown};
+use crate::config::{ModelsConfig, SourceConfig};
 use crate::error::CommandError;
 use crate::eye::Eye;
 use crate::files;
@@ -72,7 +73,9 @@ impl Line {
         let (mut source, manifest) = match &self.source {
             SourceConfig::Replay { session } => replay(session)?,
             SourceConfig::Synthetic { species, plants, seed } => self.synthetic(species, *plants, *seed)?,
-            SourceConfig::Cameras { species, speed_m_per_s } => self.live(species, *speed_m_per_s, control)?,
+            SourceConfig::Cameras { species, speed_m_per_s, spacing_m } => {
+                self.live(Sown { species, spacing: *spacing_m }, *speed_m_per_s, control)?
+            }
         };
         let live = matches!(self.source, SourceConfig::Cameras { .. });
         let species = files::species(&manifest.species)?;
@@ -99,11 +102,11 @@ impl Line {
         format!("{}-{boot}-{}", self.rig, self.clock.now().mono_ns / 1_000_000)
     }
 
-    fn live(&self, species: &str, speed: f64, control: &Control) -> Result<(Box<dyn Source>, Manifest), CommandError> {
+    fn live(&self, sown: Sown<'_>, speed: f64, control: &Control) -> Result<(Box<dyn Source>, Manifest), CommandError> {
         let settings: Vec<_> = self.cameras.iter().map(|camera| camera.settings(speed)).collect();
         let cameras = Cameras::open(&settings).map_err(|error| CommandError::failed("camera", &error))?;
         control.show_cameras(cameras.health());
-        Ok((Box::new(cameras), camera::manifest(&self.cameras, species, &self.rig, &self.session_id())))
+        Ok((Box::new(cameras), camera::manifest(&self.cameras, sown, &self.rig, &self.session_id())))
     }
 
     fn synthetic(&self, name: &str, plants: u16, seed: u64) -> Result<(Box<dyn Source>, Manifest), CommandError> {

@@ -10,7 +10,8 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::pick::Pick;
-use crate::config::camera::manifest;
+use crate::commands::spacing;
+use crate::config::camera::{Sown, manifest};
 use crate::error::{CommandError, Exit, chain};
 use crate::files;
 use crate::output::Output;
@@ -27,6 +28,9 @@ pub(super) struct Args {
     /// The crop.
     #[arg(long, default_value = "soybean")]
     species: String,
+    /// Metres from plant to plant as sown: what is seen much nearer belongs to the same plant.
+    #[arg(long, value_parser = spacing)]
+    spacing: Option<f64>,
     /// Name of the rig.
     #[arg(long, default_value = "rig")]
     rig: String,
@@ -57,7 +61,8 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     files::species(&args.species)?;
     let session = format!("rec-{}", jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ"));
     let failed = |error: &dyn std::error::Error| CommandError::failed("session", error);
-    let manifest = manifest(&cameras, &args.species, &args.rig, &session);
+    let sown = Sown { species: &args.species, spacing: args.spacing };
+    let manifest = manifest(&cameras, sown, &args.rig, &session);
     let mut recorder = Recorder::create(&args.output, manifest).map_err(|error| failed(&error))?;
     let stop = interrupted()?;
     let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(args.speed)).collect();

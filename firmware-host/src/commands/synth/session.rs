@@ -7,6 +7,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::unit_interval;
+use crate::commands::spacing;
 use crate::error::{CommandError, Exit};
 use crate::files;
 use crate::output::Output;
@@ -82,13 +83,6 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
 fn write_truth(folder: &Path, truth: &Truth) -> Result<(), CommandError> {
     let text = serde_json::to_string_pretty(truth).map_err(|error| CommandError::failed("output", &error))?;
     files::write(&folder.join("truth.json"), text.as_bytes())
-}
-
-fn spacing(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(x) if (0.01..=10.0).contains(&x) => Ok(x),
-        _ => Err("expected metres from 0.01 to 10".into()),
-    }
 }
 
 fn degrees(text: &str) -> Result<f64, String> {
