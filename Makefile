@@ -1,5 +1,5 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup build demo check soak fmt bench evaluation train species layouts
+.PHONY: setup build demo install check faults soak fmt bench evaluation train species layouts
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
 TRAINING := .cache/training
@@ -20,6 +20,11 @@ demo: build
 	@echo "Picture: demo/first-plant.png"
 	@echo "Page:    $(DEMETER) run --db $(DB), then open http://127.0.0.1:8420"
 
+# The program as it ships, its networks, units and default configuration, below DESTDIR: docs/service.md goes on.
+install: setup
+	cargo build --locked --release --bin demeter --package demeter
+	tools/install.sh target/release/demeter $(DESTDIR)
+
 # Format, lints, dependency rules, every test.
 check:
 	@tools/check.sh
@@ -27,6 +32,10 @@ check:
 # What takes too long or measures too much for `make check`: half an hour.
 soak:
 	@tools/soak.sh
+
+# What asserts times and memory, and the long counts of what `check` runs in short: alone on the machine, half an hour.
+faults:
+	@tools/faults.sh
 
 fmt:
 	cargo fmt --all

@@ -15,6 +15,7 @@ step() {
 }
 
 step "setup" tools/setup.sh
+step "packages of the tests" tools/check-packages.sh
 step "cargo tools" tools/cargo-tools.sh
 step "camera lab" tools/camera-lab.sh
 step "format" cargo fmt --all --check

@@ -4,21 +4,11 @@
 mod common;
 
 use std::path::Path;
-use std::time::Duration;
 
-use common::daemon::{Daemon, command, configure};
-use common::{Bench, stored};
+use common::Bench;
+use common::daemon::{Daemon, LONG, command, configure, configured};
 use demeter::store::Store;
 use rusqlite::Connection;
-
-/// A row of the synthetic world that takes longer than any test.
-const LONG: &str = "[source]\nkind = 'synthetic'\nplants = 40\n";
-
-fn configured(plants: u32, more: &str) -> Bench {
-    let bench = stored(plants);
-    configure(bench.folder.path(), more);
-    bench
-}
 
 /// Starts it without ONNX Runtime: no source can work.
 fn without_network(bench: &Bench) -> Daemon {
@@ -137,46 +127,5 @@ fn a_stop_in_the_middle_of_work_leaves_a_clean_store() {
     // Everything is in the file itself.
     let log = bench.path.with_extension("sqlite-wal");
     assert!(!log.exists() || log.metadata().unwrap().len() == 0, "the log was not written into the file");
-    whole(&bench);
-}
-
-/// Every plant is whole: nothing of it is missing and it is still to be sent.
-fn whole(bench: &Bench) {
-    let text = |sql| Connection::open(&bench.path).unwrap().query_row(sql, [], |row| row.get::<_, String>(0)).unwrap();
-    assert_eq!(text("PRAGMA integrity_check"), "ok");
-    assert_eq!(bench.number("SELECT count(*) FROM pragma_foreign_key_check"), 0);
-    for table in ["outbox", "organs", "plant_models", "observations"] {
-        let half = format!("SELECT count(*) FROM plants WHERE seq NOT IN (SELECT plant FROM {table})");
-        assert_eq!(bench.number(&half), 0, "plants without {table}");
-    }
-}
-
-/// reliability.md 2, `kill9`: what was acknowledged stays through SIGKILLs at any time. KILLS asks for more of them.
-#[test]
-fn kill9() {
-    let kills: u64 = std::env::var("KILLS").map_or(5, |kills| kills.parse().unwrap());
-    let seed = 20_261_123_u64;
-    eprintln!("seed {seed}");
-    let bench = configured(0, LONG);
-    let (mut acknowledged, mut random) = (Vec::new(), seed);
-    for kill in 0..kills {
-        let daemon = Daemon::start(bench.folder.path());
-        // Numerical Recipes' generator: any spread over a second does.
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let reader = bench.store.reader().unwrap();
-        let known = || reader.all().unwrap();
-        // Every other time the box has come as far as another plant.
-        while kill % 2 == 0 && known().len() == acknowledged.len() {
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        std::thread::sleep(Duration::from_millis((random >> 33) % 1000));
-        // What a reader sees has been acknowledged.
-        let known = known();
-        daemon.signal("KILL");
-        assert_eq!(daemon.ended(), None);
-        acknowledged.extend(known.into_iter().map(|plant| plant.id).skip(acknowledged.len()));
-        let stored: Vec<_> = reader.all().unwrap().into_iter().map(|plant| plant.id).collect();
-        assert_eq!(stored[..acknowledged.len()], acknowledged, "kill {kill}");
-        whole(&bench);
-    }
+    bench.assert_whole();
 }

@@ -28,7 +28,7 @@ fn every_connection_has_the_pragmas_and_sqlite_is_new_enough() {
     assert_eq!(bench.number("PRAGMA cell_size_check"), 0);
     assert!(rusqlite::version_number() >= 3_051_003, "{}", rusqlite::version());
     let mode = std::fs::metadata(&bench.path).unwrap().permissions().mode();
-    assert_eq!(mode & 0o777, 0o600);
+    assert_eq!(mode & 0o777, 0o640, "for the group of operators to read");
 }
 
 #[test]

@@ -32,11 +32,12 @@ const PRAGMAS: [(&str, &str); 6] = [
 /// How long a connection waits for another process's write: a guess well above one transaction.
 const BUSY: Duration = Duration::from_secs(5);
 
-/// Opens for writing: creates the file (mode 0600) where there is none, and migrates it to the newest schema.
+/// Opens for writing: creates the file where there is none, and migrates it to the newest schema. Its group may read it:
+/// records are no secret, and operators are in the group of the service. SQLite gives its files beside it the same mode.
 pub(super) fn writer(path: &Path) -> Result<Connection, StoreError> {
     let io = |source| StoreError::Io { path: path.into(), source };
     if !path.exists() {
-        OpenOptions::new().create(true).append(true).mode(0o600).open(path).map_err(io)?;
+        OpenOptions::new().create(true).append(true).mode(0o640).open(path).map_err(io)?;
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // The new name must survive a power cut as well as the file.
         File::open(folder).and_then(|folder| folder.sync_all()).map_err(io)?;

@@ -8,8 +8,13 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use super::{Bench, stored};
+
 /// How long anything may take that has to come; no test measures time by it.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A row of the synthetic world that takes longer than any test.
+pub(crate) const LONG: &str = "[source]\nkind = 'synthetic'\nplants = 40\n";
 
 /// It does not outlive a test that failed.
 pub(crate) struct Daemon {
@@ -30,6 +35,13 @@ impl Drop for Daemon {
 pub(crate) fn configure(folder: &Path, more: &str) {
     let config = format!("[store]\npath = 'demeter.sqlite'\n[api]\nlisten = '127.0.0.1:0'\n{more}");
     std::fs::write(folder.join("demeter.toml"), config).unwrap();
+}
+
+/// A store with so many plants and a configuration beside it.
+pub(crate) fn configured(plants: u32, more: &str) -> Bench {
+    let bench = stored(plants);
+    configure(bench.folder.path(), more);
+    bench
 }
 
 /// The command, not started: `demeter run` in the folder, told that systemd listens at `notify` in it.
@@ -109,6 +121,13 @@ impl Daemon {
     pub(crate) fn signal(&self, name: &str) {
         let killed = Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status().unwrap();
         assert!(killed.success());
+    }
+
+    /// Bytes of memory that it has had at most, as the kernel counts them.
+    pub(crate) fn most_memory(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+        line.trim().strip_suffix(" kB").unwrap().parse::<u64>().unwrap() << 10
     }
 
     /// The exit code, once it has ended; none after a signal that it could not take.

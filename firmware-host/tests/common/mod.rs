@@ -111,6 +111,18 @@ impl Bench {
         rusqlite::Connection::open(&self.path).unwrap().query_row(sql, [], |row| row.get(0)).unwrap()
     }
 
+    /// Every plant is whole: nothing of it is missing and it is still to be sent.
+    pub(crate) fn assert_whole(&self) {
+        let store = rusqlite::Connection::open(&self.path).unwrap();
+        let sound: String = store.query_row("PRAGMA integrity_check", [], |row| row.get(0)).unwrap();
+        assert_eq!(sound, "ok");
+        assert_eq!(self.number("SELECT count(*) FROM pragma_foreign_key_check"), 0);
+        for table in ["outbox", "organs", "plant_models", "observations"] {
+            let half = format!("SELECT count(*) FROM plants WHERE seq NOT IN (SELECT plant FROM {table})");
+            assert_eq!(self.number(&half), 0, "plants without {table}");
+        }
+    }
+
     /// Rows of each table that a plant writes to.
     pub(crate) fn rows(&self) -> [i64; 5] {
         ["plants", "organs", "plant_models", "observations", "outbox"]

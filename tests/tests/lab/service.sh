@@ -1,0 +1,122 @@
+# What the service promises under real systemd (tests/lab_service.rs). Each step holds, or it is named and the script ends.
+set -E
+step=start
+trap 'echo "FAILED at step: $step (line $LINENO)"; systemctl status demeter --no-pager -l | tail -25; journalctl -u demeter --no-pager | tail -40' ERR
+begin() { step=$*; echo "step $(cut -d" " -f1 /proc/uptime): $*"; }
+of() { systemctl show demeter --property="$1" --value; }
+# Waits up to so many seconds for a command to hold.
+within() { local left=$(($1 * 10)); shift; until "$@"; do left=$((left - 1)); [ $left -gt 0 ]; sleep 0.1; done; }
+store=/var/lib/demeter/demeter.sqlite
+get() { exec 9<>/dev/tcp/127.0.0.1/8420; printf 'GET %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n' "$1" >&9; cat <&9; exec 9<&-; }
+says() { [[ $(get /api/v1/status 2>/dev/null) == *$1* ]]; }
+another() { [ "$(of MainPID)" != "$1" ] && [ "$(of MainPID)" != 0 ] && systemctl is-active --quiet demeter; }
+
+begin install
+cp -a install/. /
+systemd-sysusers
+systemd-tmpfiles --create
+useradd --create-home --groups demeter agronomist
+udevadm control --reload
+systemctl daemon-reload
+[ -z "$(systemd-analyze verify demeter.service demeter-sync.service demeter-sync.timer 2>&1)" ]
+modprobe vivid n_devs=1 node_types=0x1
+udevadm settle
+ls -l /dev/demeter/
+[ "$(stat -c %a:%U:%G /var/lib/demeter)" = 750:demeter:demeter ]
+printf '[source]\nkind = "synthetic"\nplants = 3\n' >> /etc/demeter/demeter.toml
+
+begin ready
+systemctl start demeter
+[ "$(of StatusErrno)" = 0 ]
+says '"activity"'
+[ "$(ps -o user= -p "$(of MainPID)")" = demeter ]
+within 60 says finished
+
+begin records are read by operators and by nobody else
+count='select count(*) from plants'
+[ "$(su agronomist -c "sqlite3 $store '$count'")" = 3 ]
+! su nobody -s /bin/sh -c "sqlite3 $store '$count'" 2>&1
+! su agronomist -c "sqlite3 $store 'delete from plants'" 2>&1
+[ "$(stat -c %a:%U:%G $store)" = 640:demeter:demeter ]
+
+begin every directive of the sandbox is in force
+install -m 755 probe.sh /usr/local/bin/probe
+touch /tmp/of-the-host
+probe > control
+sed 's|^ExecStart=.*|ExecStart=/usr/local/bin/probe|; s/^Type=notify/Type=oneshot/; /^Restart/d; /^WatchdogSec/d' \
+    /usr/lib/systemd/system/demeter.service > /run/systemd/system/probe.service
+systemctl daemon-reload
+systemctl start probe
+journalctl --unit probe --output cat --no-pager | grep -E '^(allowed|denied) ' > sandboxed
+
+begin reload takes a good configuration and refuses a bad one
+echo 'no_such_key = 1' >> /etc/demeter/demeter.toml
+systemctl reload demeter
+within 20 says no_such_key
+sed -i '$d' /etc/demeter/demeter.toml
+systemctl reload demeter
+within 20 says '"reasons":[]'
+
+begin SIGKILL, and it is started again
+pid=$(of MainPID)
+kill -9 "$pid"
+within 30 another "$pid"
+
+begin SIGSTOP, and the watchdog starts it again
+mkdir -p /run/systemd/system/demeter.service.d
+printf '[Service]\nWatchdogSec=4s\n' > /run/systemd/system/demeter.service.d/sooner.conf
+systemctl daemon-reload
+systemctl restart demeter
+pid=$(of MainPID)
+sleep 6
+[ "$(of MainPID)" = "$pid" ]
+kill -STOP "$pid"
+within 40 another "$pid"
+journalctl --unit demeter --no-pager | grep -q 'Watchdog timeout'
+
+begin SIGPWR leaves everything in the store itself
+pid=$(of MainPID)
+systemctl kill --signal PWR demeter
+within 30 another "$pid"
+systemctl stop demeter
+[ "$(of ExecMainStatus)" = 0 ]
+[ ! -s $store-wal ]
+cp $store stopped.sqlite
+
+begin a newer store: 78 and no restart
+failed() { [ "$(of ActiveState)" = failed ] && [ "$(of ExecMainStatus)" = "$1" ]; }
+version=$(sqlite3 $store 'pragma user_version')
+sqlite3 $store 'pragma user_version = 99'
+! systemctl start demeter
+failed 78
+sleep 4
+failed 78
+sqlite3 $store "pragma user_version = $version"
+
+begin a bad configuration: 2 and no restart
+systemctl reset-failed demeter
+echo 'no_such_key = 1' >> /etc/demeter/demeter.toml
+! systemctl start demeter
+failed 2
+sleep 4
+failed 2
+sed -i '$d' /etc/demeter/demeter.toml
+
+begin a secret reaches the service and nobody else
+echo very-secret > /etc/credstore/demeter-sync
+systemctl start demeter
+[ "$(cat /run/credentials/demeter.service/demeter-sync)" = very-secret ]
+! su agronomist -c 'cat /run/credentials/demeter.service/demeter-sync' 2>&1
+! journalctl --no-pager | grep very-secret
+
+begin the nightly timer fires
+[ "$(systemctl show demeter-sync.timer --property=Persistent --value)" = yes ]
+mkdir -p /run/systemd/system/demeter-sync.timer.d
+printf '[Timer]\nOnCalendar=\nOnActiveSec=1s\nRandomizedDelaySec=0\n' > /run/systemd/system/demeter-sync.timer.d/now.conf
+systemctl daemon-reload
+ran() { [ "$(systemctl show demeter-sync.service --property=ExecMainExitTimestampMonotonic --value)" != 0 ]; }
+! ran
+systemctl start demeter-sync.timer
+within 60 ran
+
+begin done
