@@ -1,5 +1,5 @@
 # The commands of daily work. `make demo` shows the product, `make check` proves it.
-.PHONY: setup build demo install check faults soak fmt bench evaluation train species layouts
+.PHONY: setup build demo install check faults soak fmt bench evaluation train species layouts sync-check
 DB := demo/demeter.sqlite
 DEMETER := target/debug/demeter
 TRAINING := .cache/training
@@ -65,3 +65,7 @@ species: build
 # Real models of other people for tests/tests/other_models.rs: 230 MB into .cache/layouts, by way of 6 GB of PyTorch.
 layouts:
 	@tools/layouts.sh
+
+# The sync against a real S3 server, read back by DuckDB and pyarrow: builds Garage once, 12 minutes.
+sync-check: build
+	@tools/sync-check.sh

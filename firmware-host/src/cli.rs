@@ -7,7 +7,7 @@ use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 use crate::commands::{
-    camera, decode, doctor, edit, eval, fit, import, learn, models, photo, plants, replay, run, species, synth,
+    camera, decode, doctor, edit, eval, fit, import, learn, models, photo, plants, replay, run, species, sync, synth,
 };
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
@@ -53,6 +53,8 @@ enum Command {
     Synth(synth::Args),
     /// List, show and export the plants of a store.
     Plants(plants::Args),
+    /// Send what waits to the server or disk of the configuration, or tell what waits and why.
+    Sync(sync::Args),
     /// Run the daemon: the page, the API and the configured source of frames.
     Run(run::Args),
 }
@@ -74,6 +76,7 @@ impl Command {
             Self::Replay(args) => replay::run(args, output),
             Self::Synth(args) => synth::run(args, output),
             Self::Plants(args) => plants::run(args, output),
+            Self::Sync(args) => sync::run(args, output),
             Self::Run(args) => run::run(args, output),
         }
     }

@@ -1,6 +1,7 @@
 //! The configuration file: TOML, every key optional, unknown keys refused with a suggestion.
 
 mod lamp;
+mod sync;
 mod thermal;
 
 use std::cmp::Ordering;
@@ -12,6 +13,7 @@ use serde::Deserialize;
 
 pub use camera::CameraConfig;
 pub use lamp::LampConfig;
+pub use sync::SyncConfig;
 pub use thermal::ThermalConfig;
 
 use crate::error::CommandError;
@@ -38,6 +40,8 @@ pub struct Config {
     pub thermal: ThermalConfig,
     /// What the driver sees and hears.
     pub lamp: LampConfig,
+    /// Where plants go at night.
+    pub sync: SyncConfig,
     /// Where frames come from; without it stored plants are served and nothing else.
     pub source: Option<SourceConfig>,
     /// The rig's cameras, which a source of the kind `cameras` reads.
@@ -322,7 +326,10 @@ mod tests {
             ("[api]\nlistn = '127.0.0.1:1'", &["listn", "did you mean `listen`?"]),
             (
                 "[harvester]",
-                &["harvester", "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `source`, `cameras`"],
+                &[
+                    "harvester",
+                    "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `sync`, `source`, `cameras`",
+                ],
             ),
             ("[[cameras]]\nid = 'left'", &["missing field `device`"]),
             ("[source]\nkind = 'cameras'\nspeed_m_per_s = 1", &["cameras", "at least one", "none"]),

@@ -28,4 +28,6 @@ pub mod report;
 pub mod status;
 pub mod store;
 pub mod studio;
+pub mod sync;
 pub mod synthetic;
+pub mod tables;

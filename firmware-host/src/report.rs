@@ -174,6 +174,12 @@ pub fn table(plants: &[PlantReport], color: bool) -> String {
     columns(&header, &plants.iter().map(row).collect::<Vec<_>>(), color)
 }
 
+/// The contract's word for a plain enum.
+#[must_use]
+pub fn word(value: &impl Serialize) -> String {
+    serde_json::json!(value).as_str().unwrap_or_default().to_owned()
+}
+
 /// Lines up cells: the first two columns to the left, the others to the right; the header bold on terminals.
 #[must_use]
 pub fn columns<const N: usize>(header: &[&str; N], rows: &[[String; N]], color: bool) -> String {

@@ -12,6 +12,7 @@ use common::{Bench, stored};
 use demeter::api::Api;
 use demeter::report::Document;
 use demeter::status::{Activity, Health, Reason, Status};
+use demeter::sync::Attendant;
 use metrics_exporter_prometheus::PrometheusBuilder;
 use serde_json::{Value, json};
 use tokio::sync::watch;
@@ -48,7 +49,7 @@ fn server(plants: u32) -> Server {
     let address = listener.local_addr().unwrap();
     let status = watch::Sender::new(Status::default());
     let recorder = Arc::new(PrometheusBuilder::new().build_recorder());
-    let api = Api::new(bench.store.reader().unwrap(), status.subscribe(), recorder, address);
+    let api = Api::new(bench.store.reader().unwrap(), status.subscribe(), Attendant::default(), recorder, address);
     runtime.spawn(api.serve(listener, std::future::pending()));
     Server { bench, status, address, _runtime: runtime }
 }
@@ -251,4 +252,24 @@ fn the_page_is_whole_and_asks_nobody_else() {
         let text = String::from_utf8(server.get(ours).body).unwrap();
         assert!(!text.contains("://") && !text.contains("\"//"), "{ours} names another host");
     }
+}
+
+#[test]
+fn the_sync_is_shown_and_asked_for_but_not_by_a_page_elsewhere() {
+    let server = server(3);
+    let answer = server.get("/api/v1/sync").json();
+    assert_eq!((&answer["outbox"]["waiting"], &answer["report"]["asked"]), (&3.into(), &0.into()));
+    let post = |origin: &str| {
+        let line = if origin.is_empty() { String::new() } else { format!("Origin: {origin}\r\n") };
+        let host = server.address;
+        let close = "Connection: close\r\nContent-Length: 0";
+        server.send(&format!("POST /api/v1/sync/run HTTP/1.1\r\nHost: {host}\r\n{line}{close}\r\n\r\n"))
+    };
+    for origin in ["https://evil.example", "http://127.0.0.1:1", "null", "http://localhost.evil.example"] {
+        let answer = post(origin);
+        assert_eq!((answer.status, answer.error()), (403, "forbidden".into()), "{origin}");
+    }
+    assert_eq!(post("").status, 202);
+    let ours = post(&format!("http://{}", server.address));
+    assert_eq!((ours.status, &ours.json()["asked"]), (202, &2.into()));
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use demeter::config::{Config, LampConfig};
+use demeter::config::{Config, LampConfig, SyncConfig};
 
 const FILE: &str = include_str!("../../systemd/demeter.toml");
 
@@ -32,7 +32,8 @@ fn every_line_may_be_taken_out_of_its_comment_and_the_defaults_it_tells_are_true
     let all = load(&uncommented(|_| true)).unwrap();
     assert!(all.cameras.len() == 1 && all.source.is_some() && all.lamp.path.is_some() && all.lamp.buzzer.is_some());
     // What has no default is an example.
-    let examples = Config { source: None, cameras: Vec::new(), lamp: LampConfig::default(), ..all };
+    let sync = SyncConfig { url: None, endpoint: None, user: None, secret_file: None, ca_file: None, ..all.sync };
+    let examples = Config { source: None, cameras: Vec::new(), lamp: LampConfig::default(), sync, ..all };
     assert_eq!(examples, Config::default());
     // Each key alone, where its table is not a comment itself.
     let source = FILE.lines().position(|line| line == "#[source]").unwrap();

@@ -15,12 +15,26 @@ const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; 
 /// sends its own.
 pub(super) async fn host(State(api): State<Api>, request: Request, next: Next) -> Response {
     let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok());
-    let known = host.is_some_and(|host| {
-        let port = format!(":{}", api.inner.port);
-        let name = host.strip_suffix(&port).unwrap_or(host);
-        ["localhost", "127.0.0.1", "[::1]"].iter().any(|ours| name.eq_ignore_ascii_case(ours))
-    });
+    let known = host.is_some_and(|host| ours(&api, host));
     if known { next.run(request).await } else { ApiError::forbidden("unknown Host").into_response() }
+}
+
+/// Refuses what changes something when a page elsewhere asks for it; programs that are no browsers name no origin.
+pub(super) async fn origin(State(api): State<Api>, request: Request, next: Next) -> Response {
+    let origin = request.headers().get(header::ORIGIN).map(|origin| origin.to_str().unwrap_or_default());
+    let host = origin.map(|origin| origin.split_once("://").map_or(origin, |(_, host)| host));
+    if request.method().is_safe() || host.is_none_or(|host| ours(&api, host)) {
+        next.run(request).await
+    } else {
+        ApiError::forbidden("unknown Origin").into_response()
+    }
+}
+
+/// True for this machine's own names, with our port or none.
+fn ours(api: &Api, host: &str) -> bool {
+    let port = format!(":{}", api.inner.port);
+    let name = host.strip_suffix(&port).unwrap_or(host);
+    ["localhost", "127.0.0.1", "[::1]"].iter().any(|ours| name.eq_ignore_ascii_case(ours))
 }
 
 /// Headers of every answer.

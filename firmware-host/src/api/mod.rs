@@ -7,6 +7,7 @@ mod page;
 mod plants;
 mod reply;
 mod status;
+mod sync;
 
 use std::future::{Future, IntoFuture};
 use std::net::SocketAddr;
@@ -15,14 +16,16 @@ use std::time::Duration;
 
 use axum::Router;
 use axum::middleware::{from_fn, from_fn_with_state};
-use axum::routing::get;
+use axum::routing::{get, post};
 use metrics_exporter_prometheus::{PrometheusHandle, PrometheusRecorder};
 use tokio::net::TcpListener;
 use tokio::sync::{Notify, watch};
 
 use crate::status::Status;
 use crate::store::{Reader, StoreError};
+use crate::sync::Attendant;
 use reply::ApiError;
+pub use sync::SyncStatus;
 
 /// How long open connections may finish after the program was asked to stop: a guess.
 const GRACE: Duration = Duration::from_secs(3);
@@ -37,22 +40,25 @@ struct Inner {
     /// One reader: SQLite's calls block, so they run on tokio's threads for blocking work, one at a time.
     reader: Mutex<Reader>,
     status: watch::Receiver<Status>,
+    attendant: Attendant,
     recorder: Arc<PrometheusRecorder>,
     metrics: PrometheusHandle,
     port: u16,
 }
 
 impl Api {
-    /// An API over a store; `status` is what the daemon says about itself, `address` where it listens.
+    /// An API over a store; `status` is what the daemon says about itself, `attendant` does the sync, `address` is where
+    /// it listens.
     #[must_use]
     pub fn new(
         reader: Reader,
         status: watch::Receiver<Status>,
+        attendant: Attendant,
         recorder: Arc<PrometheusRecorder>,
         address: SocketAddr,
     ) -> Self {
         let (metrics, port) = (recorder.handle(), address.port());
-        Self { inner: Arc::new(Inner { reader: Mutex::new(reader), status, recorder, metrics, port }) }
+        Self { inner: Arc::new(Inner { reader: Mutex::new(reader), status, attendant, recorder, metrics, port }) }
     }
 
     /// Answers requests until `stop` is done.
@@ -83,6 +89,8 @@ impl Api {
     fn routes(self) -> Router {
         let v1 = Router::new()
             .route("/status", get(status::status))
+            .route("/sync", get(sync::show))
+            .route("/sync/run", post(sync::run))
             .route("/plants", get(plants::list))
             .route("/plants/{id}", get(plants::show))
             .route("/plants/{id}/mesh.glb", get(plants::mesh))
@@ -94,6 +102,7 @@ impl Api {
             .nest("/api/v1", v1)
             .fallback(async || ApiError::not_found("no such page"))
             .method_not_allowed_fallback(async || ApiError::method())
+            .layer(from_fn_with_state(self.clone(), guard::origin))
             .layer(from_fn_with_state(self.clone(), guard::host))
             .layer(from_fn(guard::headers))
             .with_state(self)

@@ -20,7 +20,7 @@ impl ApiError {
     }
 
     pub(super) fn method() -> Self {
-        Self { status: StatusCode::METHOD_NOT_ALLOWED, kind: "method", message: "expected GET".into() }
+        Self { status: StatusCode::METHOD_NOT_ALLOWED, kind: "method", message: "another method was expected".into() }
     }
 
     pub(super) fn bad_request(message: impl ToString) -> Self {

@@ -14,6 +14,7 @@ pub mod plants;
 pub mod replay;
 pub mod run;
 pub mod species;
+pub mod sync;
 pub mod synth;
 mod target;
 

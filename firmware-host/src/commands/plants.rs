@@ -4,15 +4,15 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, ValueEnum};
-use serde::Serialize;
 use serde_json::json;
 
 use crate::error::{CommandError, Exit};
 use crate::files;
 use crate::mesh_file::MeshFormat;
 use crate::output::Output;
-use crate::report::{Document, PlantReport, columns};
+use crate::report::{Document, PlantReport, columns, word};
 use crate::store::{PlantRow, Reader};
+use crate::tables;
 
 /// Arguments of `demeter plants`.
 #[derive(Debug, clap::Args)]
@@ -43,7 +43,7 @@ enum Action {
         /// The format.
         #[arg(long)]
         format: Format,
-        /// The file for csv and geojson (else standard output), the folder for meshes (else the current one).
+        /// The file for csv and geojson (else standard output) and parquet, the folder for meshes (else the current one).
         #[arg(short, long)]
         output: Option<PathBuf>,
     },
@@ -55,6 +55,8 @@ enum Format {
     Csv,
     /// A feature a plant; those without a position fix have no geometry.
     Geojson,
+    /// The table that the sync sends; needs --output.
+    Parquet,
     /// One binary PLY mesh a plant.
     Ply,
     /// One OBJ mesh a plant.
@@ -85,6 +87,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
             match format {
                 Format::Csv => table(&csv(&rows), target.as_deref(), output)?,
                 Format::Geojson => table(&geojson(&rows), target.as_deref(), output)?,
+                Format::Parquet => parquet(&reader, &rows, target.as_deref())?,
                 Format::Ply => meshes(&reader, &rows, MeshFormat::Ply, target.as_deref())?,
                 Format::Obj => meshes(&reader, &rows, MeshFormat::Obj, target.as_deref())?,
                 Format::Glb => meshes(&reader, &rows, MeshFormat::Glb, target.as_deref())?,
@@ -130,6 +133,13 @@ fn table(text: &str, target: Option<&Path>, output: &Output) -> Result<(), Comma
         Some(path) => files::write(path, text.as_bytes()),
         None => output.text(text),
     }
+}
+
+fn parquet(reader: &Reader, rows: &[PlantRow], target: Option<&Path>) -> Result<(), CommandError> {
+    let target = target.ok_or_else(|| CommandError::usage("usage", "--format parquet: expected --output FILE"))?;
+    let seqs: Vec<_> = rows.iter().map(|row| row.seq).collect();
+    let table = tables::plants(&reader.whole(&seqs)?).map_err(|error| CommandError::failed("parquet", &error))?;
+    files::write(target, &table)
 }
 
 fn meshes(reader: &Reader, rows: &[PlantRow], format: MeshFormat, target: Option<&Path>) -> Result<(), CommandError> {
@@ -179,11 +189,6 @@ fn csv(rows: &[PlantRow]) -> String {
         writeln!(text, "{}", cells.join(",")).unwrap_or_default();
     }
     text
-}
-
-/// The contract's word for a plain enum.
-fn word(value: &impl Serialize) -> String {
-    json!(value).as_str().unwrap_or_default().to_owned()
 }
 
 /// A CSV cell (RFC 4180).

@@ -9,8 +9,9 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
 use super::line::End;
+use crate::error::CommandError;
 
-/// Threads' news that wait to be taken up: each of the three who send has one at a time.
+/// Threads' news that wait to be taken up: each of the four who send has one at a time.
 const NEWS_WAITING: usize = 8;
 
 /// What happened.
@@ -26,6 +27,8 @@ pub(super) enum Event {
     StoreAnswered(bool),
     /// The line from frames to plants is over.
     LineEnded(End),
+    /// The store broke under the sync.
+    SyncBroke(CommandError),
     /// The page is not served any more.
     ApiEnded(io::Result<()>),
 }

@@ -37,6 +37,7 @@ use crate::error::{CommandError, Exit, chain};
 use crate::pipeline::Control;
 use crate::status::{Activity, Status};
 use crate::store::{Reader, Store, StoreError};
+use crate::sync::{self, Attendant};
 use disk::{Disk, folder_of};
 use event::{Event, Events};
 use lamp::{Lamp, STEP};
@@ -68,6 +69,7 @@ pub struct Daemon {
     disk: Disk,
     lamp: Lamp,
     store_beat: StoreBeat,
+    attendant: Attendant,
     /// Why the newest configuration is not in force.
     refused: Option<String>,
     /// Why an output of the lamp cannot be written.
@@ -108,6 +110,7 @@ impl Daemon {
             thermal: Thermal::new(config.thermal.clone()),
             disk: Disk::new(path, config.store.min_free_bytes()),
             lamp: Lamp::new(&config.lamp),
+            attendant: Attendant::new(&config.sync),
             load,
             config,
             store,
@@ -135,6 +138,12 @@ impl Daemon {
         self.status.subscribe()
     }
 
+    /// Whom to ask for a sync.
+    #[must_use]
+    pub fn attendant(&self) -> Attendant {
+        self.attendant.clone()
+    }
+
     /// A reader of the store.
     ///
     /// # Errors
@@ -154,6 +163,10 @@ impl Daemon {
         let mut links = Links { api: api.clone(), close: Some(close), news: news.clone() };
         // Before the first answer, so that nobody is told that there is no source.
         self.start_line(&links);
+        let broken = links.news.clone();
+        let syncing = sync::start(&self.attendant, &self.store, &self.config.store.path, &self.clock, move |error| {
+            broken.blocking_send(Event::SyncBroke(error)).unwrap_or_default();
+        });
         let server = tokio::spawn(async move {
             let result = api.serve(listener, async { closed.await.unwrap_or_default() }).await;
             // When nobody listens any more the program is ending.
@@ -166,7 +179,7 @@ impl Daemon {
                 break end;
             }
         };
-        drop(links);
+        drop((links, syncing));
         // Clients that do not read their answer lose it.
         tokio::time::timeout(LAST_ANSWERS, server).await.ok();
         self.lamp.dark().unwrap_or_else(|error| tracing::warn!("{error}"));
@@ -184,7 +197,7 @@ impl Daemon {
             Event::StoreAnswered(well) => self.store_beat.answer(well, Instant::now()),
             Event::LineEnded(End::Line(activity)) => return self.line_ended(activity, links),
             Event::LineEnded(End::Store(error)) => return Break(Err(error.into())),
-            Event::LineEnded(End::Bug(error)) => return Break(Err(error)),
+            Event::LineEnded(End::Bug(error)) | Event::SyncBroke(error) => return Break(Err(error)),
             Event::ApiEnded(result) if self.give_up.is_none() => {
                 let error = result.err().unwrap_or_else(|| std::io::ErrorKind::ConnectionAborted.into());
                 return Break(Err(CommandError::failed("api", &error)));
@@ -263,6 +276,7 @@ impl Daemon {
             .then(|| "store.path and api.listen are taken at the next start: restart the service".into());
         self.thermal.configure(config.thermal.clone());
         self.disk.configure(config.store.min_free_bytes());
+        self.attendant.configure(&config.sync);
         self.lamp.dark().unwrap_or_else(|error| tracing::warn!("{error}"));
         self.lamp = Lamp::new(&config.lamp);
         let line = |config: &Config| (config.source.clone(), config.models.clone(), config.cameras.clone());

@@ -4,12 +4,16 @@
 
 mod connection;
 mod error;
+mod outbox;
 mod plant;
 mod read;
+mod whole;
 mod write;
 
 pub use connection::APPLICATION_ID;
 pub use error::StoreError;
+pub use outbox::{Batch, Outbox, Waiting};
 pub use plant::{NewPlant, NewSession};
 pub use read::{Page, PlantRow, Reader, SessionRow, StoredRecord, Summary};
+pub use whole::WholePlant;
 pub use write::{Saved, Store};

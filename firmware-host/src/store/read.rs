@@ -13,7 +13,7 @@ use crate::report::{OrganReport, PlantReport};
 /// Reads the store beside its writer.
 #[derive(Debug)]
 pub struct Reader {
-    connection: Connection,
+    pub(super) connection: Connection,
 }
 
 /// A plant in a list.
@@ -96,7 +96,8 @@ pub struct SessionRow {
 }
 
 /// The columns of a [`PlantRow`].
-const ROW: &str = "SELECT p.seq, p.id, p.session, s.name AS species, p.time, p.time_trusted, p.scale_source, p.x, p.y,
+pub(super) const ROW: &str =
+    "SELECT p.seq, p.id, p.session, s.name AS species, p.time, p.time_trusted, p.scale_source, p.x, p.y,
     p.z, p.latitude, p.longitude, p.height, p.leaf_count, p.blade_count, p.leaf_area, p.cd,
     length(p.record) AS bytes, p.thumbnail IS NOT NULL AS thumbnail
     FROM plants p JOIN species s ON s.hash = p.species";
@@ -242,7 +243,7 @@ impl Reader {
     }
 }
 
-fn plant_row(row: &Row<'_>) -> rusqlite::Result<PlantRow> {
+pub(super) fn plant_row(row: &Row<'_>) -> rusqlite::Result<PlantRow> {
     let all = |a: Option<f64>, b: Option<f64>| a.zip(b);
     let ground = all(row.get("x")?, row.get("y")?);
     let up: Option<f64> = row.get("z")?;

@@ -187,12 +187,12 @@ impl Store {
         Ok(())
     }
 
-    fn lock(&self) -> MutexGuard<'_, Connection> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Connection> {
         // A panic while holding the lock dropped its transaction, which rolled back: the connection is as good as new.
         self.connection.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn transaction<T>(
+    pub(super) fn transaction<T>(
         &self,
         doing: &'static str,
         work: impl FnOnce(&Transaction<'_>) -> Result<T, StoreError>,

@@ -2,6 +2,8 @@
 #![allow(dead_code)]
 
 pub(crate) mod daemon;
+pub(crate) mod depot;
+pub(crate) mod sync;
 
 use std::path::PathBuf;
 

@@ -1,0 +1,28 @@
+//! The nightly sync (spec/appliance.md "Sync"): plants leave the outbox as tables, pictures and species files for a
+//! bucket, a WebDAV server or a mounted disk.
+//!
+//! Every key holds the BLAKE3 of what it names, and a plant leaves the outbox only when both its tables, its picture and
+//! its species file were read back with that hash. [`Syncer`] does one pass; [`attend`] is the daemon's loop around it.
+//! Objects are sent one by one and none is larger than about a megabyte, so a cut costs the one on its way.
+
+mod ask;
+mod attend;
+mod backoff;
+mod clock;
+mod destination;
+mod lock;
+mod pack;
+mod pass;
+mod secret;
+mod wire;
+
+pub use ask::ask;
+pub(crate) use attend::open;
+pub use attend::{Attendant, Report, attend, start};
+pub use backoff::Backoff;
+pub use clock::SyncClock;
+pub use destination::{Destination, SendError, SyncError};
+pub use lock::Lock;
+pub use pass::{Pass, Syncer, until_done};
+pub use secret::Secret;
+pub use wire::MAX_REPLY;
