@@ -106,7 +106,7 @@ pub struct Destination {
 }
 
 /// Longest message kept, characters: a guess that holds what an S3 server says.
-const MAX_MESSAGE: usize = 300;
+const MAX_MESSAGE: usize = 400;
 
 impl Destination {
     /// Makes the destination that the configuration names; nothing is sent yet. `None` where it names none.

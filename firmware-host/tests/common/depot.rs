@@ -14,7 +14,7 @@ use rustls::{ServerConfig, ServerConnection, StreamOwned};
 pub(crate) enum Fault {
     /// Nothing.
     None,
-    /// This status, and a body that quotes the request's headers.
+    /// This status, and a body that quotes the request's token.
     Status(u16),
     /// 307 to there.
     Redirect(String),
@@ -190,7 +190,8 @@ impl Shared {
                 return Ok(false);
             }
             (Fault::Status(status), _) => {
-                out = format!("no: you said {headers}").into_bytes();
+                let quoted = headers.lines().find(|line| line.to_lowercase().starts_with("authorization"));
+                out = format!("no: you said {quoted:?}").into_bytes();
                 *status
             }
             (Fault::Redirect(_), _) => 307,
