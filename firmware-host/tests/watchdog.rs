@@ -77,7 +77,7 @@ fn watchdog_pings_stop_for_a_stage_that_is_frozen_and_not_for_those_that_wait_fo
         answering.answer(true, later);
         assert!(!alive(&stages(&control, later), &answering, later));
         thaw.send(()).unwrap();
-        assert!(!running.join().unwrap().unwrap().plants.is_empty());
+        assert!(running.join().unwrap().unwrap().plants > 0);
     });
     let later = Instant::now() + STUCK * 100;
     assert!(stages(&control, later).iter().all(|stage| !stage.stuck), "a stage that waits for work is alive");

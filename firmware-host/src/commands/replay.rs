@@ -58,9 +58,13 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let (control, clock) = (Control::default(), SystemClock::new());
     let run =
         Run { manifest: &manifest, species: &species, store: &store, control: &control, clock: &clock, live: false };
+    let mut plants = Vec::new();
     let outcome = pipeline::run(&run, &mut source, &mut eye, |progress| match progress {
         Progress::Frame => bar.inc(1),
-        Progress::Plant(plant) => bar.set_message(plant.id.clone().unwrap_or_default()),
+        Progress::Plant(plant) => {
+            bar.set_message(plant.id.clone().unwrap_or_default());
+            plants.push(plant);
+        }
     });
     bar.finish_and_clear();
     let outcome = outcome.map_err(|error| match error {
@@ -73,7 +77,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         output.text(&summary(&outcome, &losses))?;
     }
     let warnings = if output.json { losses } else { Vec::new() };
-    output.plants(&Document { plants: outcome.plants, warnings, seconds: Some(outcome.seconds) })?;
+    output.plants(&Document { plants, warnings, seconds: Some(outcome.seconds) })?;
     Ok(exit)
 }
 
@@ -100,7 +104,7 @@ fn summary(outcome: &Outcome, losses: &[String]) -> String {
     let (frames, seconds) = (outcome.frames, outcome.seconds);
     let mut text = format!(
         "{frames} frames, {} plants in {seconds:.1} s: {:.1} frames/s\n",
-        outcome.plants.len(),
+        outcome.plants,
         frames as f64 / seconds.max(1e-9)
     );
     for line in losses {

@@ -94,9 +94,11 @@ impl Daemon {
             broken("stuck", format!("the {} has been at one item for {seconds:.0} s", stage.name))
         };
         let stuck = status.stages.iter().filter(|stage| stage.stuck).map(stuck);
+        let all_lost = status.cameras.iter().all(|camera| camera.state == CameraState::Lost);
         let lost = |camera: &CameraHealth| {
             let why = camera.last_error.as_deref().unwrap_or("no frames");
-            degraded("camera", format!("camera {} gives no frames: {why}", camera.id))
+            let message = format!("camera {} gives no frames: {why}", camera.id);
+            if all_lost { broken("camera", message) } else { degraded("camera", message) }
         };
         let lost = status.cameras.iter().filter(|camera| camera.state == CameraState::Lost).map(lost);
         let hot = (status.heat.slowness > 1).then(|| {

@@ -54,12 +54,12 @@ pub struct Run<'a> {
 }
 
 /// What happened, told as it happens.
-#[derive(Clone, Copy, Debug)]
-pub enum Progress<'a> {
+#[derive(Clone, Debug)]
+pub enum Progress {
     /// A frame is through, or refused.
     Frame,
     /// A plant is stored.
-    Plant(&'a PlantReport),
+    Plant(PlantReport),
 }
 
 /// What came of a run.
@@ -73,8 +73,8 @@ pub struct Outcome {
     pub unseen: BTreeMap<&'static str, u64>,
     /// Plants that were seen and could not be kept, by reason.
     pub lost: BTreeMap<&'static str, u64>,
-    /// Plants stored, in the order of their numbers.
-    pub plants: Vec<PlantReport>,
+    /// Plants stored; what they are is told as they are: a season's would not fit into memory.
+    pub plants: u64,
     /// Why the source ended early.
     pub ended: Option<String>,
     /// Time of the whole run, seconds.
@@ -111,7 +111,7 @@ pub fn run(
     run: &Run<'_>,
     source: &mut dyn Source,
     eye: &mut Eye,
-    mut progress: impl FnMut(Progress<'_>),
+    mut progress: impl FnMut(Progress),
 ) -> Result<Outcome, PipelineError> {
     let started = Instant::now();
     save_names(run, eye)?;
@@ -135,7 +135,7 @@ pub fn run(
     let frames_per_second = outcome.frames as f64 / outcome.seconds.max(1e-9);
     let detail = serde_json::json!({
         "session": run.manifest.session_id, "frames": outcome.frames, "refused": outcome.gate.refused,
-        "unseen": outcome.unseen, "dropped": run.control.dropped(), "plants": outcome.plants.len(),
+        "unseen": outcome.unseen, "dropped": run.control.dropped(), "plants": outcome.plants,
         "lost": outcome.lost, "ended": outcome.ended,
         "frames_per_second": frames_per_second,
     });

@@ -23,7 +23,13 @@ modprobe vivid n_devs=1 node_types=0x1
 udevadm settle
 ls -l /dev/demeter/
 [ "$(stat -c %a:%U:%G /var/lib/demeter)" = 750:demeter:demeter ]
-printf '[source]\nkind = "synthetic"\nplants = 3\n' >> /etc/demeter/demeter.toml
+cp /etc/demeter/demeter.toml installed.toml
+# The configuration as it is installed, and more.
+configure() { cat installed.toml - > /etc/demeter/demeter.toml; }
+made_up='[source]
+kind = "synthetic"
+plants = 3'
+configure <<< "$made_up"
 
 begin ready
 systemctl start demeter
@@ -50,10 +56,10 @@ systemctl start probe
 journalctl --unit probe --output cat --no-pager | grep -E '^(allowed|denied) ' > sandboxed
 
 begin reload takes a good configuration and refuses a bad one
-echo 'no_such_key = 1' >> /etc/demeter/demeter.toml
+configure <<< 'no_such_key = 1'
 systemctl reload demeter
 within 20 says no_such_key
-sed -i '$d' /etc/demeter/demeter.toml
+configure <<< "$made_up"
 systemctl reload demeter
 within 20 says '"reasons":[]'
 
@@ -83,6 +89,23 @@ systemctl stop demeter
 [ ! -s $store-wal ]
 cp $store stopped.sqlite
 
+begin a full disk makes plants wait, and nothing is lost
+mount -t tmpfs -o "size=200m,mode=750,uid=$(id -u demeter),gid=$(id -g demeter)" full /var/lib/demeter
+configure <<< "${made_up/3/6}"
+systemctl start demeter
+pid=$(of MainPID)
+some() { [ "$(su agronomist -c "sqlite3 $store '$count'")" -gt 0 ]; }
+within 60 some
+! dd if=/dev/zero of=/var/lib/demeter/fill bs=1M 2>/dev/null
+within 20 says storage_full
+before=$(sqlite3 $store "$count")
+rm /var/lib/demeter/fill
+within 10 says '"full":false'
+within 60 says finished
+[ "$before" -lt 6 ] && [ "$(sqlite3 $store "$count")" = 6 ] && [ "$(of MainPID)" = "$pid" ]
+systemctl stop demeter
+umount /var/lib/demeter
+
 begin a newer store: 78 and no restart
 failed() { [ "$(of ActiveState)" = failed ] && [ "$(of ExecMainStatus)" = "$1" ]; }
 version=$(sqlite3 $store 'pragma user_version')
@@ -95,12 +118,12 @@ sqlite3 $store "pragma user_version = $version"
 
 begin a bad configuration: 2 and no restart
 systemctl reset-failed demeter
-echo 'no_such_key = 1' >> /etc/demeter/demeter.toml
+configure <<< 'no_such_key = 1'
 ! systemctl start demeter
 failed 2
 sleep 4
 failed 2
-sed -i '$d' /etc/demeter/demeter.toml
+configure <<< "$made_up"
 
 begin a secret reaches the service and nobody else
 echo very-secret > /etc/credstore/demeter-sync
@@ -108,6 +131,28 @@ systemctl start demeter
 [ "$(cat /run/credentials/demeter.service/demeter-sync)" = very-secret ]
 ! su agronomist -c 'cat /run/credentials/demeter.service/demeter-sync' 2>&1
 ! journalctl --no-pager | grep very-secret
+
+begin a camera is unplugged and comes back without a restart
+configure <<'TOML'
+[source]
+kind = "cameras"
+speed_m_per_s = 0.5
+[[cameras]]
+id = "left"
+device = "platform:vivid-000"
+format = "yuyv"
+hfov_deg = 60
+height_m = 1.0
+TOML
+systemctl reload demeter
+within 30 says '"state":"streaming"'
+pid=$(of MainPID) restarts=$(of NRestarts)
+echo vivid.0 > /sys/bus/platform/drivers/vivid/unbind
+within 30 says '"state":"lost"'
+within 10 says '"health":"broken"'
+echo vivid.0 > /sys/bus/platform/drivers/vivid/bind
+within 30 says '"state":"streaming"'
+[ "$(of MainPID)" = "$pid" ] && [ "$(of NRestarts)" = "$restarts" ]
 
 begin the nightly timer fires
 [ "$(systemctl show demeter-sync.timer --property=Persistent --value)" = yes ]
