@@ -63,7 +63,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         Progress::Frame => bar.inc(1),
         Progress::Plant(plant) => {
             bar.set_message(plant.id.clone().unwrap_or_default());
-            plants.push(plant);
+            plants.push(plant.clone());
         }
     });
     bar.finish_and_clear();

@@ -40,7 +40,7 @@ pub(super) struct Keeper<'a> {
 impl Keeper<'_> {
     /// Takes what the looker found. Only the store's own failure is an error. A plant that comes when the run must have
     /// ended is left out whole.
-    pub(super) fn take(&mut self, found: Found, progress: &mut impl FnMut(Progress)) -> Result<(), StoreError> {
+    pub(super) fn take(&mut self, found: Found, progress: &mut impl FnMut(Progress<'_>)) -> Result<(), StoreError> {
         let run = self.run;
         let working = run.control.keeper.work();
         match found {
@@ -74,7 +74,7 @@ impl Keeper<'_> {
         &mut self,
         closed: &Closed<FrameKey, BestView>,
         working: &Working<'_>,
-        progress: &mut impl FnMut(Progress),
+        progress: &mut impl FnMut(Progress<'_>),
     ) -> Result<(), StoreError> {
         let started = Instant::now();
         let id = format!("{}-{:04}", self.run.manifest.session_id, closed.number);
@@ -101,7 +101,7 @@ impl Keeper<'_> {
                 let milliseconds = started.elapsed().as_secs_f64() * 1e3;
                 self.note("plant_stored", &json!({"plant": id, "ms": milliseconds}))?;
                 plant.report.ms = Some(milliseconds);
-                progress(Progress::Plant(plant.report));
+                progress(Progress::Plant(&plant.report));
                 self.outcome.plants += 1;
                 Ok(())
             }

@@ -54,12 +54,12 @@ pub struct Run<'a> {
 }
 
 /// What happened, told as it happens.
-#[derive(Clone, Debug)]
-pub enum Progress {
+#[derive(Clone, Copy, Debug)]
+pub enum Progress<'a> {
     /// A frame is through, or refused.
     Frame,
     /// A plant is stored.
-    Plant(PlantReport),
+    Plant(&'a PlantReport),
 }
 
 /// What came of a run.
@@ -111,7 +111,7 @@ pub fn run(
     run: &Run<'_>,
     source: &mut dyn Source,
     eye: &mut Eye,
-    mut progress: impl FnMut(Progress),
+    mut progress: impl FnMut(Progress<'_>),
 ) -> Result<Outcome, PipelineError> {
     let started = Instant::now();
     save_names(run, eye)?;
