@@ -35,6 +35,12 @@ FILES = {
     "depth": ("depth.u16", "<u2", ()),
 }
 CAMERAS = "camera.f32"
+# Ground is what agrees with one horizontal plane: least share of the known background within a part of its depth, and of
+# the picture; below it plants stand no higher than this (in logarithms of depth, at their lowest 2 %), or they stand
+# elsewhere, on a bench say. All guesses, by eye.
+AGREES, AGREEING, BARE, STANDING = 0.06, 0.7, 0.05, 0.15
+# A ray that drops by less than this part of its depth meets the ground beyond 25 heights of the camera: no ground.
+LEAST_DROP = 0.04
 # Part of a window that must show the picture for its camera to be learned from.
 MOSTLY = 0.85
 
@@ -66,8 +72,9 @@ class Folder:
         return total.hexdigest()
 
     def image(self, i):
-        """Image i as (rgb, sem, dist 0..1 by DELTA, log depth or 0, where depth is known), all [h, w] but rgb [h, w, 3] u8,
-        and its camera (ln tan(hfov / 2), up in the camera's frame, 1 for known) [5]."""
+        """Image i as (rgb, sem, dist 0..1 by DELTA, log depth or 0, where depth is known, log depth of the ground beneath
+        or NaN), all [h, w] but rgb [h, w, 3] u8, and its camera (ln tan(hfov / 2), up in the camera's frame, 1 for known)
+        [5]."""
         known = self.depth[i] > 0
         log_depth = LOG_NEAR + (self.depth[i].astype(np.float32) - 1) / 65534 * (LOG_FAR - LOG_NEAR)
         log_depth = np.where(known, log_depth, 0).astype(np.float32)
@@ -77,13 +84,37 @@ class Folder:
         hfov, pitch, roll = self.cameras[i].astype(np.float64)
         up = np.cos(pitch) * np.sin(roll), -np.cos(pitch) * np.cos(roll), np.sin(pitch)
         camera = np.array([np.log(np.tan(hfov / 2)), *up, 1])
-        return np.array(self.rgb[i]), np.array(self.sem[i]), dist, log_depth, known, camera
+        sem = np.array(self.sem[i])
+        return np.array(self.rgb[i]), sem, dist, log_depth, known, ground_beneath(sem, log_depth, known, camera), camera
 
 
-def tensors(rgb, sem, dist, log_depth, known, camera):
+def ground_beneath(sem, log_depth, known, camera):
+    """Log depth of the horizontal plane that the plants stand on, behind every pixel that looks down on it; NaN elsewhere,
+    and everywhere when the background is something else, a wall say."""
+    height, width = sem.shape
+    nothing = np.full(sem.shape, np.nan, np.float32)
+    right, down = (2 * np.arange(width) + 1 - width) / width, (2 * np.arange(height) + 1 - height) / width
+    # By how much the ray to a pixel drops on its way to a depth of 1.
+    drop = -(np.exp(camera[0]) * (camera[1] * right[None] + camera[2] * down[:, None]) + camera[3])
+    log_drop = np.log(drop, where=drop > LEAST_DROP, out=nothing.copy())
+    # The camera's height above what is seen there.
+    heights = log_depth + log_drop
+    bare = known & (sem == 0) & np.isfinite(log_drop)
+    if bare.mean() < BARE:
+        return nothing
+    level = np.median(heights[bare])
+    if (np.abs(heights[bare] - level) < AGREES).sum() < AGREEING * (known & (sem == 0)).sum():
+        return nothing
+    relief = (level - heights)[known & (sem > 0) & np.isfinite(log_drop)]
+    if relief.size > 0 and np.quantile(relief, 0.02) > STANDING:
+        return nothing
+    return (level - log_drop).astype(np.float32)
+
+
+def tensors(rgb, sem, dist, log_depth, known, ground, camera):
     """One sample as the tensors that training takes: image in 0..1 [3, h, w] and its labels."""
     image = torch.from_numpy(np.ascontiguousarray(rgb.transpose(2, 0, 1), np.float32))
-    labels = (sem.astype(np.int64), *(label.astype(np.float32) for label in (dist, log_depth, known, camera)))
+    labels = (sem.astype(np.int64), *(label.astype(np.float32) for label in (dist, log_depth, known, ground, camera)))
     return (image, *(torch.from_numpy(np.ascontiguousarray(label)) for label in labels))
 
 
@@ -112,25 +143,26 @@ def shape_of(seed, batch):
     return SHAPES[np.random.default_rng((seed, 1 << 40, batch)).integers(len(SHAPES))]
 
 
-def randomised(random, shape, rgb, sem, dist, log_depth, known, camera):
+def randomised(random, shape, *labelled):
     """A crop at another scale, maybe mirrored, under another light, through a worse camera."""
-    rgb, sem, dist, log_depth, known, camera = cropped(random, shape, rgb, sem, dist, log_depth, known, camera)
+    *arrays, camera = cropped(random, shape, *labelled)
     if random.random() < 0.5:
-        rgb, sem, dist, log_depth, known = (array[:, ::-1] for array in (rgb, sem, dist, log_depth, known))
+        arrays = [array[:, ::-1] for array in arrays]
         camera = camera * [1, -1, 1, 1, 1]
+    rgb, sem, dist, log_depth, known, ground = arrays
     rgb = rgb.astype(np.float32) / 255
     organ = ((sem > 0) & (sem != IGNORED)).astype(np.float32)
     if random.random() < 0.4:
         rgb, hidden = other_background(random, rgb, softened(organ, random.uniform(0.3, 0.8)))
         if hidden:
-            known = known & (organ > 0)
+            known, ground = known & (organ > 0), np.full_like(ground, np.nan)
     if random.random() < 0.6:
         soft = softened(organ, 0.5)
         rgb = rgb + soft * (recoloured(random, rgb, hue=0.35, saturation=0.4, gain=0.35) - rgb)
-    return through_lens(random, lit(random, rgb)), sem, dist, log_depth, known, camera
+    return through_lens(random, lit(random, rgb)), sem, dist, log_depth, known, ground, camera
 
 
-def cropped(random, shape, rgb, sem, dist, log_depth, known, camera):
+def cropped(random, shape, rgb, sem, dist, log_depth, known, ground, camera):
     """A window brought to `shape`, 0.7 to 1.5 times as large, no side more than 1.2 times the picture's; what lies outside
     the picture is a mirror image whose labels are ignored."""
     least = max(0.7, *(part / (1.2 * whole) for part, whole in zip(shape, sem.shape)))
@@ -146,17 +178,18 @@ def cropped(random, shape, rgb, sem, dist, log_depth, known, camera):
     if max(max(edges) for edges in pad) > 0:
         rgb = np.pad(rgb, [*pad, (0, 0)], mode="reflect")
         sem = np.pad(sem, pad, constant_values=IGNORED)
-        dist, log_depth, known = (np.pad(array, pad) for array in (dist, log_depth, known))
+        dist, log_depth, known, ground = (np.pad(array, pad) for array in (dist, log_depth, known, ground))
     y, x = max(0, y), max(0, x)
     rgb = np.asarray(Image.fromarray(rgb[y : y + tall, x : x + wide]).resize(shape[::-1], Image.BILINEAR))
     rows, columns = (
         at + np.clip(((np.arange(to) + 0.5) * part / to).astype(int), 0, part - 1)
         for at, part, to in ((y, tall, shape[0]), (x, wide, shape[1]))
     )
-    sem, dist, log_depth, known = (array[np.ix_(rows, columns)] for array in (sem, dist, log_depth, known))
+    maps = sem, dist, log_depth, known, ground
+    sem, dist, log_depth, known, ground = (array[np.ix_(rows, columns)] for array in maps)
     # Distances grow with the scale.
     dist = np.where(dist >= 1, 1, np.minimum(1, dist / scale))
-    return rgb, sem, dist, log_depth, known, camera
+    return rgb, sem, dist, log_depth, known, ground, camera
 
 
 def window_camera(camera, whole, corner, part):

@@ -14,6 +14,9 @@ CLASSES = 4
 # Where the plane's inverse depth falls below about 1 / INVERSE_SHARP it bends to INVERSE_LEAST: beyond the horizon no
 # depth is negative. Units are whatever the network chooses, with 1 in the picture's middle at the start. Guesses.
 INVERSE_SHARP, INVERSE_LEAST = 20.0, 0.02
+# A ground seen from straight above has no slope in the picture: what stands on it is nearer by this part of the ground's
+# inverse depth a unit. A guess.
+LEVEL_STEEPNESS = 0.3
 
 
 def convolution(inputs, outputs, stride=1, dilation=1):
@@ -66,6 +69,11 @@ def places(x):
     return torch.stack([right[None].expand(height, width), down[:, None].expand(height, width)])[None].float()
 
 
+def log_nearness(inverse):
+    """The logarithm of an inverse depth that is bent to stay above 0."""
+    return torch.log(F.softplus(INVERSE_SHARP * inverse) / INVERSE_SHARP + INVERSE_LEAST)
+
+
 class Whole(nn.Module):
     """From means and first moments of the features over the picture: the camera [n, 6], the plane's inverse depth as a
     linear function of `places` [n, 3], and what every pixel is told [n, width]."""
@@ -105,6 +113,12 @@ class Organ2d(nn.Module):
         self.head = nn.Conv2d(WIDTHS[0], 4 * (CLASSES + 2), 3, padding=1)
 
     def forward(self, image):
+        sem, dist, ground, relief, camera = self.parts(image)
+        return sem, dist, ground - relief, camera
+
+    def parts(self, image):
+        """As `forward`, but log depth in two: of the plane that the ground (or a wall) is, and by how much nearer what is
+        seen there is."""
         seen = [(image - 0.45) * 4.0]
         for down in self.down:
             seen.append(down(seen[-1]))
@@ -116,9 +130,21 @@ class Organ2d(nn.Module):
         for up, skip in zip(reversed(self.up), reversed(seen[1:-1])):
             x = up(x, skip)
         x = self.head(x)
-        # The inverse depth of a plane is linear in the picture; what stands on it is left to the head.
-        inverse = plane[:, :1, None, None] + (plane[:, 1:, None, None] * places(x)).sum(1, keepdim=True)
-        ground = -torch.log(F.softplus(INVERSE_SHARP * inverse) / INVERSE_SHARP + INVERSE_LEAST)
-        sem, dist, depth = x.split((4 * CLASSES, 4, 4), 1)
-        sem, dist, depth = (F.pixel_shuffle(part, 2) for part in (sem, dist, depth.float() + ground))
-        return sem, torch.sigmoid(dist), depth, camera
+        # The inverse depth of a plane is linear in the picture. What stands on it is as near as the plane is at its foot,
+        # so the head is asked how far below a pixel that foot is seen: a local question, which neither the camera's tilt
+        # nor the distance enters.
+        middle, slope = plane[:, :1, None, None], plane[:, 1:, None, None]
+        inverse = middle + (slope * places(x)).sum(1, keepdim=True)
+        steepness = torch.sqrt((slope**2).sum(1, keepdim=True) + (LEVEL_STEEPNESS * middle) ** 2)
+        sem, dist, foot = x.split((4 * CLASSES, 4, 4), 1)
+        nearness = log_nearness(inverse)
+        relief = log_nearness(inverse.detach() + steepness.detach() * foot.float()) - nearness.detach()
+        ground = -nearness.repeat(1, 4, 1, 1)
+        sem, dist, ground, relief = (F.pixel_shuffle(part, 2) for part in (sem, dist, ground, relief))
+        return sem, torch.sigmoid(dist), ground, relief, camera
+
+    def scale_relief(self, gain):
+        """The same network, with what stands on the ground this many times as high in the picture."""
+        with torch.no_grad():
+            self.head.weight[-4:] *= gain
+            self.head.bias[-4:] *= gain

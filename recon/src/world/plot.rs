@@ -19,13 +19,16 @@ const TRIANGLES: usize = 300_000;
 const FARTHEST: f64 = 14.0;
 /// From here on plants are drawn with few faces: a leaf is then some pixels long.
 const FAR: f64 = 2.5;
+/// How high crops stand under the mast, in its heights: from seedlings of some centimetres to leaves that hide the soil.
+const LOWEST: f64 = 0.03;
+const HIGHEST: f64 = 0.75;
 
 /// Rows on a field from the height of a robot's mast, looking along them or across, weeds between.
 pub(super) fn rows(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Shot, WorldError> {
     let wanted = if rng.random_bool(0.7) { Wanted::Broad } else { Wanted::Grass };
     let bed = nursery.bed(wanted, 4, rng)?;
     let weeds = nursery.bed(Wanted::Any, 4, rng)?;
-    let intrinsics = Intrinsics::from_hfov(size, size, rng.random_range(40f64..100.0).to_radians());
+    let intrinsics = Intrinsics::from_hfov(size, size, rng.random_range(40f64..110.0).to_radians());
     let height = rng.random_range(0.5..1.7);
     // Mostly as robots look at rows, some along the horizon and some straight down.
     let pitch: f64 = match rng.random_range(0..20) {
@@ -41,9 +44,9 @@ pub(super) fn rows(nursery: &Nursery, size: u32, rng: &mut Seeded) -> Result<Sho
     let camera =
         Pinhole { intrinsics, world_from_camera: level.then(&Pose::new(DQuat::from_rotation_z(roll), DVec3::ZERO)) };
 
-    // Crops stay below the mast: higher ones would only fill the picture.
+    // Crops stay below the mast: higher ones would only fill the picture. Half of them are young: robots weed early.
     let tall = f64::from(bed.height).max(0.02);
-    let crop_size = (height * rng.random_range(0.1..0.75) / tall).min(1.2);
+    let crop_size = (height * rng.random_range(LOWEST.ln()..HIGHEST.ln()).exp() / tall).min(1.2);
     let (between, along) = (rng.random_range(0.3..0.8), rng.random_range(0.12..0.45));
     let gaps = if rng.random_bool(0.3) { rng.random_range(0.0..0.6) } else { 0.05 };
     let mut spots = Vec::new();

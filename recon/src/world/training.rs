@@ -79,7 +79,7 @@ fn sensor(exposure: f32, detail: f32, size: u32, rng: &mut Seeded) -> Sensor {
 
 /// A camera looking from `from` at the plants' box so that they fill about `fill` of the picture.
 pub(super) fn aim(scene: &Scene, from: DVec3, fill: f64, size: u32, rng: &mut Seeded) -> Pinhole {
-    let intrinsics = Intrinsics::from_hfov(size, size, rng.random_range(25f64..100.0).to_radians());
+    let intrinsics = Intrinsics::from_hfov(size, size, rng.random_range(25f64..110.0).to_radians());
     let (low, high) = scene.bounds();
     let half = (high - low).as_dvec3() * 0.5;
     let look = Pose::looking_at(from, DVec3::ZERO, DVec3::Z).rotation;
