@@ -7,4 +7,5 @@ export PATH="$PWD/.cache/tools/bin:$PATH"
 
 tools/setup.sh
 tools/cargo-tools.sh
+DEMETER_FAULTS=full cargo nextest run --locked --release --package demeter --test sync --profile faults
 cargo nextest run --locked --release --package demeter --run-ignored only --profile faults --no-capture "$@"

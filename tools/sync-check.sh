@@ -10,7 +10,7 @@ venv=.cache/sync-check
 command -v garage >/dev/null || cargo install --locked --root .cache/tools garage@^2.5
 if [ ! -x "$venv/bin/python" ]; then
     python3 -m venv "$venv"
-    "$venv/bin/pip" install -q 'duckdb==1.*' 'pyarrow==2*' 's3fs==2026.*'
+    "$venv/bin/pip" install -q 'duckdb==1.*' 'pyarrow==26.*' 's3fs==2026.*'
 fi
 
 work=$(mktemp -d)
