@@ -161,7 +161,10 @@ within 30 says '"state":"streaming"'
 [ "$(of MainPID)" = "$pid" ]
 [ "$(of NRestarts)" = "$restarts" ]
 
-begin the nightly timer fires
+begin the nightly timer fires, and plants leave
+install -d -o demeter -g demeter /var/lib/demeter/depot
+sed -i 's|^#url = .*|url = "file:///var/lib/demeter/depot"|; s|^#trust_clock = .*|trust_clock = true|' /etc/demeter/demeter.toml
+systemctl reload demeter
 [ "$(systemctl show demeter-sync.timer --property=Persistent --value)" = yes ]
 mkdir -p /run/systemd/system/demeter-sync.timer.d
 printf '[Timer]\nOnCalendar=\nOnActiveSec=1s\nRandomizedDelaySec=0\n' > /run/systemd/system/demeter-sync.timer.d/now.conf
@@ -170,5 +173,7 @@ ran() { [ "$(systemctl show demeter-sync.service --property=ExecMainExitTimestam
 refused ran
 systemctl start demeter-sync.timer
 within 60 ran
+[ "$(systemctl show demeter-sync.service --property=ExecMainStatus --value)" = 0 ]
+[ -n "$(find /var/lib/demeter/depot -name '*.parquet')" ]
 
 begin done
