@@ -124,10 +124,11 @@ impl Gate {
         &self.counts
     }
 
-    /// What the pictures say of each camera's lens.
+    /// The lenses that the pictures say are not clear.
     #[must_use]
-    pub fn lenses(&self) -> BTreeMap<&CameraId, Lens> {
-        self.cameras.iter().map(|(id, memory)| (id, memory.lens.state())).collect()
+    pub fn bad_lenses(&self) -> Vec<(CameraId, Lens)> {
+        let states = self.cameras.iter().map(|(id, memory)| (id.clone(), memory.lens.state()));
+        states.filter(|(_, lens)| *lens != Lens::Clear).collect()
     }
 
     /// Dirt costs no frame: the parts of the picture beside it are as good as ever. It is said once.

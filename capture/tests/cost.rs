@@ -1,7 +1,6 @@
 //! What a camera costs this machine once its frames are in memory: figures of docs/cameras.md.
 
 use std::path::Path;
-use std::time::Instant;
 
 use demeter_capture::{Gate, GateConfig, decode_photo};
 use demeter_frame::{Frame, PixelFormat};
@@ -12,6 +11,12 @@ use common::{frame, jpeg};
 
 const RATE: f64 = 30.0;
 const FRAMES: u64 = 120;
+
+/// Time that this process was given, seconds: others on the machine do not count.
+fn processor() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
 
 #[test]
 #[ignore = "prints figures, proves nothing: make soak"]
@@ -34,9 +39,10 @@ fn cost_of_a_camera() {
                 Frame { format, width, height, stride, bytes: bytes.into(), ..frame(i) }
             })
             .collect();
-        let started = Instant::now();
-        frames.iter().for_each(|frame| drop(gate.admit(frame).expect("a good frame")));
-        let seconds = started.elapsed().as_secs_f64() / FRAMES as f64;
+        let started = processor();
+        // A picture that was made larger is not sharp; it costs the same.
+        frames.iter().for_each(|frame| drop(gate.admit(frame)));
+        let seconds = (processor() - started) / FRAMES as f64;
         eprintln!("{name}: {:.2} ms a frame, {:.0} % of one core at {RATE}/s", seconds * 1e3, seconds * RATE * 100.0);
     }
 }

@@ -54,7 +54,10 @@ fn plan(controls: &Controls, rate: f64) -> Vec<(u32, &'static str, i64)> {
 /// Why the control is not at the value now; `None` when it is.
 fn set_one(device: &v4l::Device, id: u32, value: i64) -> Option<String> {
     if let Err(error) = device.set_control(Control { id, value: Value::Integer(value) }) {
-        return Some(format!("cannot be set to {value}: {error}"));
+        return Some(match error.raw_os_error() {
+            Some(libc::EINVAL) => format!("the camera has no such control, or not with {value}"),
+            _ => format!("cannot be set to {value}: {error}"),
+        });
     }
     match device.control(id) {
         Ok(Control { value: Value::Integer(found), .. }) if found == value => None,

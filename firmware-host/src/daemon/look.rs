@@ -101,6 +101,8 @@ impl Daemon {
             if all_lost { broken("camera", message) } else { degraded("camera", message) }
         };
         let lost = status.cameras.iter().filter(|camera| camera.state == CameraState::Lost).map(lost);
+        let lenses = self.line.as_ref().map_or_else(Vec::new, |control| control.bad_lenses());
+        let lenses = lenses.into_iter().map(|(camera, lens)| degraded("lens", format!("camera {camera}: {lens}")));
         let hot = (status.heat.slowness > 1).then(|| {
             let (celsius, part) = (status.heat.celsius.unwrap_or_default(), status.heat.slowness);
             degraded("hot", format!("the box is hot ({celsius:.0} °C) and works 1 second in {part}"))
@@ -113,6 +115,7 @@ impl Daemon {
             .chain(full)
             .chain(stuck)
             .chain(lost)
+            .chain(lenses)
             .chain(hot)
             .chain(refused)
             .chain(dark)

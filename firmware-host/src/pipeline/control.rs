@@ -1,8 +1,9 @@
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use demeter_capture::{CameraHealth, CamerasHealth};
+use demeter_capture::{CameraHealth, CamerasHealth, Lens};
+use demeter_frame::CameraId;
 
 use super::beat::Beat;
 
@@ -26,6 +27,7 @@ pub struct Control {
     slowness: AtomicU32,
     full: AtomicBool,
     cameras: OnceLock<CamerasHealth>,
+    bad_lenses: Mutex<Vec<(CameraId, Lens)>>,
     /// When everything must have ended; unset while the run goes on.
     deadline: OnceLock<Instant>,
 }
@@ -68,6 +70,16 @@ impl Control {
     #[must_use]
     pub fn cameras(&self) -> Vec<CameraHealth> {
         self.cameras.get().map_or_else(Vec::new, CamerasHealth::read)
+    }
+
+    /// The lenses that are covered or dirty, as far as their pictures tell.
+    #[must_use]
+    pub fn bad_lenses(&self) -> Vec<(CameraId, Lens)> {
+        self.bad_lenses.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub(super) fn show_lenses(&self, bad: Vec<(CameraId, Lens)>) {
+        *self.bad_lenses.lock().unwrap_or_else(PoisonError::into_inner) = bad;
     }
 
     /// The stages by name, in the order of the data path.

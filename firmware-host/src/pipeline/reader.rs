@@ -58,6 +58,7 @@ pub(super) fn read(run: &Run<'_>, source: &mut dyn Source, to: &Sender<Arrival>)
                 None => return (gate.counts().clone(), Some(chain(&error))),
             },
         };
+        run.control.show_lenses(gate.bad_lenses());
         drop(working);
         if to.blocking_send(arrival).is_err() {
             break;
