@@ -22,6 +22,8 @@ mod counts;
 mod gate;
 mod lens;
 mod libcamera;
+#[cfg(feature = "nokhwa")]
+mod nokhwa;
 mod order;
 mod pixels;
 mod session;

@@ -101,14 +101,15 @@ finish s
     );
     let console = lab.run(&format!("{RECORDING}{WEBCAM}{script}")).ok();
     let (good, webcam) = cameras(&lab, "s");
-    assert_unharmed(&good);
-    assert_eq!(webcam["reopened"], cycles, "{console}");
     let text = |name: &str| std::fs::read_to_string(lab.path(name)).unwrap();
-    let descriptors: Vec<u32> = text("descriptors").split_whitespace().map(|n| n.parse().unwrap()).collect();
-    assert_eq!(descriptors[0], descriptors[1], "descriptors before and after");
     let mut millis: Vec<u64> = text("again_ms").lines().map(|line| line.parse().unwrap()).collect();
     millis.sort_unstable();
     eprintln!("from plug to frame, ms: median {}, worst {}", millis[millis.len() / 2], millis[millis.len() - 1]);
+    eprintln!("{webcam}\n{good}");
+    assert_eq!(webcam["reopened"], cycles, "{console}");
+    let descriptors: Vec<u32> = text("descriptors").split_whitespace().map(|n| n.parse().unwrap()).collect();
+    assert_eq!(descriptors[0], descriptors[1], "descriptors before and after");
+    assert_unharmed(&good);
     if soaking() {
         assert!(millis.iter().all(|&ms| ms <= 5000), "{millis:?}");
     }

@@ -101,6 +101,8 @@ fn driver(settings: &CameraSettings) -> Box<dyn Driver> {
     match settings.backend {
         Backend::V4l2 => Box::new(v4l2::Camera(settings)),
         Backend::Libcamera => Box::new(libcamera::Camera(settings)),
+        #[cfg(feature = "nokhwa")]
+        Backend::Nokhwa => Box::new(crate::nokhwa::Camera::new(settings)),
     }
 }
 

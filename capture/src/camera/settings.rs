@@ -27,6 +27,9 @@ pub enum Backend {
     V4l2,
     /// Debian's program `cam`, for sensors that need a pipeline in user space.
     Libcamera,
+    /// The crate nokhwa, on laptops.
+    #[cfg(feature = "nokhwa")]
+    Nokhwa,
 }
 
 /// What frames a camera gives.

@@ -102,6 +102,8 @@ fn backend(text: &str) -> Result<Backend, String> {
     match text {
         "v4l2" => Ok(Backend::V4l2),
         "libcamera" => Ok(Backend::Libcamera),
+        #[cfg(feature = "nokhwa")]
+        "nokhwa" => Ok(Backend::Nokhwa),
         _ => Err("expected v4l2 or libcamera".into()),
     }
 }
