@@ -7,8 +7,11 @@ use demeter_frame::Frame;
 use super::{CameraFault, CameraHealth, CameraSettings, CameraState};
 use crate::{CameraError, SourceError};
 
-/// Frames of one camera that wait to be fetched: an eighth of a second at 30 a second, 24 MB of raw 1080p.
-const WAITING: usize = 4;
+/// Frames of one camera that wait to be fetched: a second at 30 a second, which a slow disk may take now and then.
+const WAITING: usize = 30;
+
+/// Bytes of them: a second of 1080p MJPEG, and one raw frame of any size in any case.
+const WAITING_BYTES: usize = 16 << 20;
 
 /// What the cameras' threads and whoever fetches frames share.
 #[derive(Debug)]
@@ -36,6 +39,13 @@ struct Line {
 pub(super) struct Arrival {
     pub(super) mono_ns: u64,
     pub(super) frame: Result<Frame, CameraError>,
+}
+
+impl Line {
+    /// Held by the frames that wait.
+    fn bytes(&self) -> usize {
+        self.waiting.iter().filter_map(|arrival| arrival.frame.as_ref().ok()).map(|frame| frame.bytes.len()).sum()
+    }
 }
 
 impl Board {
@@ -95,11 +105,11 @@ impl Board {
         }
         line.health.state = CameraState::Streaming;
         line.last = Some(Instant::now());
-        if line.waiting.len() == WAITING {
+        line.waiting.push_back(arrival);
+        while line.waiting.len() > WAITING || line.waiting.len() > 1 && line.bytes() > WAITING_BYTES {
             line.waiting.pop_front();
             line.health.dropped += 1;
         }
-        line.waiting.push_back(arrival);
         self.changed.notify_all();
     }
 

@@ -17,6 +17,8 @@ enum Act {
     /// Gives a frame that it counts as this.
     Frame(u32),
     Damaged(u32),
+    /// As a frame, of 5 MB.
+    Large(u32),
     /// Gives nothing any more.
     Hang,
     /// Says that it is gone.
@@ -57,6 +59,10 @@ impl Stream for Playing {
                 self.0.pop_front();
                 std::thread::sleep(Duration::from_millis(2));
                 Ok(Some(shot(count, false)))
+            }
+            Some(Act::Large(count)) => {
+                self.0.pop_front();
+                Ok(Some(Shot { bytes: vec![0; 5 << 20].into(), ..shot(count, false) }))
             }
             Some(Act::Damaged(count)) => {
                 self.0.pop_front();
@@ -146,17 +152,21 @@ fn damaged_and_missing_frames_are_counted_apart() {
 
 #[test]
 fn frames_that_nobody_fetches_make_room_for_newer_ones_and_are_counted() {
-    let mut acts = frames(0, 50);
-    acts.push(Act::Hang);
-    let mut cameras = open(&[("left", vec![acts])]);
-    let health = cameras.health();
-    let until = Instant::now() + Duration::from_secs(10);
-    while health.read()[0].frames < 50 && Instant::now() < until {
-        std::thread::sleep(Duration::from_millis(5));
+    let small = [frames(0, 50), vec![Act::Hang]].concat();
+    let large = [(0..10).map(Act::Large).collect(), vec![Act::Hang]].concat();
+    // A second of them, or as many as fit into 16 MB.
+    for (acts, kept) in [(small, 20..50), (large, 7..10)] {
+        let came = kept.end;
+        let mut cameras = open(&[("left", vec![acts])]);
+        let health = cameras.health();
+        let until = Instant::now() + Duration::from_secs(10);
+        while health.read()[0].frames < came && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let (frames, _) = drain(&mut cameras);
+        assert_eq!(health.read()[0].dropped, kept.start);
+        assert_eq!(frames.iter().map(|(_, seq)| *seq).collect::<Vec<_>>(), kept.collect::<Vec<_>>());
     }
-    let (frames, _) = drain(&mut cameras);
-    assert_eq!(frames.iter().map(|(_, seq)| *seq).collect::<Vec<_>>(), [46, 47, 48, 49]);
-    assert_eq!(health.read()[0].dropped, 46);
 }
 
 #[test]
