@@ -78,7 +78,9 @@ impl Columns {
         }
     }
 
-    pub(super) fn finish(self) -> Result<RecordBatch, ParquetError> {
-        Ok(RecordBatch::try_new(Arc::new(Schema::new(self.fields)), self.arrays)?)
+    /// The table, with what is said of it as a whole.
+    pub(super) fn finish(self, metadata: HashMap<String, String>) -> Result<RecordBatch, ParquetError> {
+        let schema = Schema::new(self.fields).with_metadata(metadata);
+        Ok(RecordBatch::try_new(Arc::new(schema), self.arrays)?)
     }
 }

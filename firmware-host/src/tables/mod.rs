@@ -6,6 +6,8 @@
 mod columns;
 mod traits;
 
+use std::collections::HashMap;
+
 use arrow_array::RecordBatch;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
@@ -48,7 +50,10 @@ pub fn plants(plants: &[WholePlant]) -> Result<Vec<u8>, ParquetError> {
     columns.text("cameras", plants, |p| Some(&p.cameras));
     let warnings: Vec<_> = plants.iter().map(|p| json!(p.report.warnings).to_string()).collect();
     columns.text("warnings", &warnings, |json| Some(json));
-    write(columns.finish()?, Some(geo()))
+    // GDAL and DuckDB look for it in the file, pyarrow and GeoPandas in Arrow's schema.
+    let geo = geo();
+    let of_schema = geo.value.iter().map(|value| (geo.key.clone(), value.clone())).collect();
+    write(columns.finish(of_schema)?, Some(geo))
 }
 
 /// A table of the organs of plants, one row each, parents before children.
@@ -71,7 +76,7 @@ pub fn organs(plants: &[WholePlant]) -> Result<Vec<u8>, ParquetError> {
     columns.number("residual", &[("unit", "m")], &organs, |(_, organ)| organ.residual);
     columns.number("visible_fraction", &[("unit", "1")], &organs, |(_, organ)| organ.visible_fraction);
     columns.traits(&organs, |column| column.organ, |(_, organ)| &organ.traits);
-    write(columns.finish()?, None)
+    write(columns.finish(HashMap::new())?, None)
 }
 
 /// BLAKE3 in hexadecimal, as keys and columns name contents.
