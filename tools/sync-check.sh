@@ -1,13 +1,18 @@
 #!/usr/bin/env bash
 # `make sync-check`: the bundled session is replayed, synced to a real S3 server (Garage, built once in about 12 minutes
-# on two cores) and to a folder, and read back there by DuckDB and pyarrow with the query of docs/sync.md.
+# on two cores) and to a folder, read back there by DuckDB and pyarrow with the queries of docs/sync.md, compacted, and read
+# back again.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH="$PWD/.cache/tools/bin:$PATH"
 demeter=target/debug/demeter
 venv=.cache/sync-check
 
-command -v garage >/dev/null || cargo install --locked --root .cache/tools garage@^2.5
+# Garage is built in a folder that stays until it is done, so that a build that was cut goes on where it was.
+if ! command -v garage >/dev/null; then
+    cargo install --locked --root .cache/tools --target-dir .cache/tools/garage-build garage@^2.5
+    rm -rf .cache/tools/garage-build
+fi
 if [ ! -x "$venv/bin/python" ]; then
     python3 -m venv "$venv"
     "$venv/bin/pip" install -q 'duckdb==1.*' 'pyarrow==26.*' 's3fs==2026.*'
@@ -53,34 +58,65 @@ store = sqlite3.connect(sys.argv[1])
 store.execute("UPDATE plants SET latitude = 52.0 + seq * 1e-5, longitude = 5.5 WHERE seq % 2 = 0")
 store.commit()
 EOF
-cp "$work/demeter.sqlite" "$work/second.sqlite"
+# The same drive with another rig comes late, for a month that is compacted by then.
+cp "$work/demeter.sqlite" "$work/late.sqlite"
+"$venv/bin/python" - "$work/late.sqlite" <<'EOF'
+import sqlite3, sys
+store = sqlite3.connect(sys.argv[1])
+store.execute("INSERT INTO rigs VALUES ('late')")
+store.execute("UPDATE sessions SET rig = 'late'")
+store.commit()
+EOF
 echo "$GARAGE_DEFAULT_SECRET_KEY" > "$work/secret"
 mkdir "$work/disk"
-cat > "$work/garage-sync.toml" <<EOF
-[store]
-path = "$work/demeter.sqlite"
-[api]
-listen = "127.0.0.1:$(port)"
-[sync]
-url = "s3://demeter/farm"
-endpoint = "http://127.0.0.1:$s3"
-region = "garage"
-user = "$GARAGE_DEFAULT_ACCESS_KEY"
-secret_file = "$work/secret"
-trust_clock = true
-EOF
-cat > "$work/disk-sync.toml" <<EOF
-[store]
-path = "$work/second.sqlite"
-[api]
-listen = "127.0.0.1:$(port)"
-[sync]
-url = "file://$work/disk"
-trust_clock = true
-EOF
+# Each place gets both stores, out of copies of its own: what was sent leaves the outbox.
 for place in garage disk; do
-    echo "== $place"
-    time $demeter sync --now --config "$work/$place-sync.toml"
-    $demeter sync --now --json --config "$work/$place-sync.toml" | grep '"objects":0'
+    for store in demeter late; do
+        cp "$work/$store.sqlite" "$work/$place-$store.sqlite"
+        {
+            echo "[store]"
+            echo "path = '$work/$place-$store.sqlite'"
+            echo "[api]"
+            echo "listen = '127.0.0.1:$(port)'"
+            echo "[sync]"
+            echo "trust_clock = true"
+            if [ $place = disk ]; then
+                echo "url = 'file://$work/disk'"
+            else
+                echo "url = 's3://demeter/farm'"
+                echo "endpoint = 'http://127.0.0.1:$s3'"
+                echo "region = 'garage'"
+                echo "user = '$GARAGE_DEFAULT_ACCESS_KEY'"
+                echo "secret_file = '$work/secret'"
+            fi
+        } > "$work/$place-$store.toml"
+    done
 done
-"$venv/bin/python" tools/sync_check.py "$demeter" "$work/demeter.sqlite" "$work/disk" "http://127.0.0.1:$s3" demeter/farm
+
+there=("$work/disk" "http://127.0.0.1:$s3" demeter/farm)
+both() {
+    for place in garage disk; do
+        echo "== $place: $*"
+        "$1" "$work/$place" "$2"
+    done
+}
+sync() {
+    time $demeter sync --now --config "$1-$2.toml"
+    $demeter sync --now --json --config "$1-$2.toml" | grep '"objects":0'
+}
+compact() {
+    $demeter compact --json --config "$1-demeter.toml" | grep "\"written\":$2"
+}
+read_back() {
+    "$venv/bin/python" tools/compact_check.py "${there[@]}" "$@"
+}
+
+both sync demeter
+"$venv/bin/python" tools/sync_check.py "$demeter" "$work/demeter.sqlite" "${there[@]}"
+both compact true
+read_back 1+0 "$work/demeter.sqlite"
+both sync late
+read_back 1+1 "$work/demeter.sqlite" "$work/late.sqlite"
+both compact true
+both compact false
+read_back 1+0 "$work/demeter.sqlite" "$work/late.sqlite"

@@ -78,10 +78,8 @@ def check(demeter, store, root, files, duck):
     print(f"{root}: {len(found)} plants and {organs} organs are as in the store")
 
 
-def main():
-    """Both places."""
-    demeter, store, folder, endpoint, bucket = sys.argv[1:]
-    store = sqlite3.connect(store)
+def places(folder, endpoint, bucket):
+    """A bucket and a folder: each its root, pyarrow's way to it, and DuckDB that can read it."""
     key, secret = os.environ["GARAGE_DEFAULT_ACCESS_KEY"], os.environ["GARAGE_DEFAULT_SECRET_KEY"]
     scheme, address = endpoint.split("://")
     region = {"region": "garage"}
@@ -93,8 +91,14 @@ def main():
     duck.register_filesystem(
         s3fs.S3FileSystem(key=key, secret=secret, endpoint_url=endpoint, client_kwargs={"region_name": "garage"})
     )
-    check(demeter, store, f"s3://{bucket}", s3, duck)
-    check(demeter, store, folder, pyarrow.fs.LocalFileSystem(), duck)
+    return [(f"s3://{bucket}", s3, duck), (folder, pyarrow.fs.LocalFileSystem(), duck)]
+
+
+def main():
+    """Both places."""
+    demeter, store, *where = sys.argv[1:]
+    for root, files, duck in places(*where):
+        check(demeter, sqlite3.connect(store), root, files, duck)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@ use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 use crate::commands::{
-    camera, decode, doctor, edit, eval, fit, import, learn, models, photo, plants, replay, run, species, sync, synth,
+    camera, compact, decode, doctor, edit, eval, fit, import, learn, models, photo, plants, replay, run, species, sync,
+    synth,
 };
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
@@ -55,6 +56,8 @@ enum Command {
     Plants(plants::Args),
     /// Send what waits to the server or disk of the configuration, or tell what waits and why.
     Sync(sync::Args),
+    /// Merge the daily files of past months where the plants went, so that there are few to query.
+    Compact(compact::Args),
     /// Run the daemon: the page, the API and the configured source of frames.
     Run(run::Args),
 }
@@ -77,6 +80,7 @@ impl Command {
             Self::Synth(args) => synth::run(args, output),
             Self::Plants(args) => plants::run(args, output),
             Self::Sync(args) => sync::run(args, output),
+            Self::Compact(args) => compact::run(args, output),
             Self::Run(args) => run::run(args, output),
         }
     }

@@ -1,6 +1,7 @@
 //! One file a command: its arguments and what it does with them.
 
 pub mod camera;
+pub mod compact;
 pub mod decode;
 pub mod doctor;
 pub mod edit;

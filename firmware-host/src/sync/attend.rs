@@ -4,12 +4,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde::{Deserialize, Serialize};
 use tokio::sync::{Notify, oneshot};
 
-use super::backoff::Backoff;
+use super::backoff::{Backoff, SHORTEST};
 use super::clock::SyncClock;
 use super::destination::Destination;
 use super::lock::Lock;
 use super::pack::PLANTS_A_TABLE;
 use super::pass::{Pass, PassError, Syncer};
+use super::ways::watch;
 use crate::clock::SystemClock;
 use crate::config::SyncConfig;
 use crate::error::CommandError;
@@ -26,6 +27,7 @@ struct Inner {
     config: Mutex<SyncConfig>,
     report: Mutex<Report>,
     asked: Notify,
+    appeared: Notify,
 }
 
 /// How the sync stands.
@@ -68,6 +70,16 @@ impl Attendant {
         report.asked
     }
 
+    /// Tells that a way to the destination has come: what waits is tried again now instead of later.
+    pub fn appeared(&self) {
+        self.inner.appeared.notify_one();
+    }
+
+    /// Where plants go.
+    pub(super) fn destination(&self) -> Option<String> {
+        self.config().url.clone()
+    }
+
     /// How it stands.
     #[must_use]
     pub fn report(&self) -> Report {
@@ -83,8 +95,8 @@ impl Attendant {
     }
 }
 
-/// The daemon's sync: waits to be asked, then passes until nothing waits, with growing waits after failures. Never ends
-/// of its own; dropped in the middle of a pass it loses at most the object on its way.
+/// The daemon's sync: waits to be asked or for a way to the destination, then passes until nothing waits, with growing
+/// waits after failures. Never ends of its own; dropped in the middle of a pass it loses at most the object on its way.
 ///
 /// # Errors
 /// [`PassError`] when the store breaks.
@@ -94,8 +106,12 @@ pub async fn attend<C: SyncClock>(
     clock: &C,
 ) -> Result<(), PassError> {
     let mut backoff = Backoff::new(fastrand::u64(..));
+    let Inner { asked: by_somebody, appeared, .. } = &*attendant.inner;
     loop {
-        attendant.inner.asked.notified().await;
+        tokio::select! {
+            () = by_somebody.notified() => {}
+            () = appeared.notified() => {}
+        }
         loop {
             let asked = attendant.report().asked;
             let config = attendant.config().clone();
@@ -114,9 +130,17 @@ pub async fn attend<C: SyncClock>(
                 report.next = wait.and_then(|wait| now.checked_add(wait).ok()).map(|time| time.to_string());
             }
             let Some(wait) = wait else { break };
+            // However often ways come and go, a server that does not answer has its half minute.
+            let rest = async {
+                clock.sleep(SHORTEST).await;
+                tokio::select! {
+                    () = clock.sleep(wait.saturating_sub(SHORTEST)) => {}
+                    () = appeared.notified() => {}
+                }
+            };
             tokio::select! {
-                () = clock.sleep(wait) => {}
-                () = attendant.inner.asked.notified() => {}
+                () = rest => {}
+                () = by_somebody.notified() => {}
             }
         }
     }
@@ -134,11 +158,14 @@ pub fn start(
     let (stop, stopped) = oneshot::channel();
     let (attendant, store, path, clock) = (attendant.clone(), store.clone(), path.to_owned(), clock.clone());
     std::thread::spawn(move || {
+        // Nothing here is urgent: the line goes first. On Linux this is said of the calling thread alone.
+        rustix::process::nice(10).ok();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let outcome = runtime.map_err(|error| CommandError::failed("runtime", &error)).and_then(|runtime| {
             runtime.block_on(async {
                 tokio::select! {
                     _ = stopped => Ok(()),
+                    never = watch(&attendant, Path::new("/"), &*clock) => never,
                     outcome = attend(&attendant, (&store, &path), &*clock) => outcome.map_err(CommandError::from),
                 }
             })
@@ -169,10 +196,15 @@ pub(crate) fn open<'a, C: SyncClock>(
     path: &Path,
     clock: C,
 ) -> Result<(Syncer<'a, C>, Lock), CommandError> {
-    let nowhere = || CommandError::usage("configuration", "configuration: `sync.url`: expected a place, found nothing");
-    let destination = Destination::open(config)?.ok_or_else(nowhere)?;
+    let destination = destination(config)?;
     let lock = Lock::take(path)?;
     let (reader, trusting) = (store.reader()?, config.trust_clock);
     let syncer = Syncer { store, reader, destination, clock, trusting, plants_a_table: PLANTS_A_TABLE };
     Ok((syncer, lock))
+}
+
+/// The destination, which has to be named.
+pub(crate) fn destination(config: &SyncConfig) -> Result<Destination, CommandError> {
+    let nowhere = || CommandError::usage("configuration", "configuration: `sync.url`: expected a place, found nothing");
+    Destination::open(config)?.ok_or_else(nowhere)
 }

@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 /// The shortest wait after a failure: no more than two requests a minute go to a server that does not answer.
-const SHORTEST: Duration = Duration::from_secs(30);
+pub(super) const SHORTEST: Duration = Duration::from_secs(30);
 /// The longest: a depot's network is there for minutes when a tractor comes in (a guess).
 const LONGEST: Duration = Duration::from_secs(20 * 60);
 

@@ -1,8 +1,6 @@
-use std::path::PathBuf;
-
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use futures_util::StreamExt;
+use futures_util::{StreamExt, TryStreamExt};
 use object_store::aws::AmazonS3Builder;
 use object_store::http::HttpBuilder;
 use object_store::local::LocalFileSystem;
@@ -11,89 +9,12 @@ use object_store::{ClientOptions, ObjectStore, ObjectStoreExt, RetryConfig};
 use reqwest::Url;
 use reqwest::header::HeaderValue;
 
+use super::error::{SendError, SyncError};
 use super::secret::Secret;
-use super::wire::Wire;
+use super::wire::{MAX_OBJECT, Wire};
 use crate::config::SyncConfig;
-use crate::error::{CommandError, Exit, chain};
-
-/// Why there is no destination.
-#[derive(Debug, thiserror::Error)]
-pub enum SyncError {
-    /// A key of the configuration.
-    #[error("configuration: `sync.{key}`: expected {expected}, found {found}")]
-    Config {
-        /// The key.
-        key: &'static str,
-        /// What it must be.
-        expected: &'static str,
-        /// What it is.
-        found: String,
-    },
-    /// A file with other content than it should have; secrets are not quoted.
-    #[error("{path}: expected {expected}, found {found}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What it must hold.
-        expected: &'static str,
-        /// What it holds.
-        found: String,
-    },
-    /// A file that cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's own error.
-        source: std::io::Error,
-    },
-    /// The client cannot be made.
-    #[error("sync: {message}")]
-    Client {
-        /// Why.
-        message: String,
-    },
-    /// Another program syncs this store just now.
-    #[error("{path}: expected no other sync of this store, found one at work")]
-    Locked {
-        /// The lock.
-        path: PathBuf,
-    },
-}
-
-impl From<SyncError> for CommandError {
-    fn from(error: SyncError) -> Self {
-        match &error {
-            SyncError::Config { expected, found, .. } | SyncError::File { expected, found, .. } => {
-                Self::usage("configuration", &error).with(expected, found)
-            }
-            SyncError::Io { .. } => Self::usage("configuration", chain(&error)),
-            SyncError::Client { .. } => Self::failed("sync", &error),
-            SyncError::Locked { .. } => Self { exit: Exit::Failed, ..Self::failed("sync_running", &error) },
-        }
-    }
-}
-
-/// Why an object is not there.
-#[derive(Debug, thiserror::Error)]
-pub enum SendError {
-    /// The way, the server or its answer: what comes next would fare no better.
-    #[error("{doing}: {message}")]
-    Server {
-        /// `put` or `get`.
-        doing: &'static str,
-        /// What went wrong.
-        message: String,
-    },
-    /// The server took the object and gave something else back.
-    #[error("{key}: expected to read back what was sent, found {found}")]
-    Differs {
-        /// The object.
-        key: String,
-        /// What came back.
-        found: String,
-    },
-}
+use crate::error::chain;
+use crate::tables::hash;
 
 /// Where plants go.
 #[derive(Debug)]
@@ -104,6 +25,18 @@ pub struct Destination {
     /// What goes to the server as a token: a server may quote it back at us.
     token: Option<Secret>,
 }
+
+/// What lies at a destination.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Object {
+    /// Its key below the destination.
+    pub key: String,
+    /// Bytes.
+    pub size: u64,
+}
+
+/// Most objects that a listing may have: a guess at some years of a large fleet.
+const MAX_LISTED: usize = 1_000_000;
 
 /// Longest message kept, characters: a guess that holds what an S3 server says.
 const MAX_MESSAGE: usize = 400;
@@ -130,16 +63,25 @@ impl Destination {
         }
         let path = |path: &str| Path::parse(path.trim_matches('/')).map_err(|error| wrong(error.to_string()));
         let name = config.endpoint.as_ref().map_or_else(|| text.clone(), |endpoint| format!("{text} at {endpoint}"));
-        let at = |prefix, store| Self { name, prefix, store, token: None };
+        let at = |prefix, store| Self { prefix, ..Self::over(name, store) };
         Ok(Some(match url.scheme() {
             "s3" => at(path(url.path())?, bucket(config, url.host_str().unwrap_or_default())?),
             "http" | "https" => {
                 let token = token(config)?;
-                Self { token: token.clone(), ..at(Path::default(), server(config, &url, token)?) }
+                // Lists name objects from the server's root on, so that is where its store begins.
+                let prefix = Path::from_url_path(url.path()).map_err(|error| wrong(error.to_string()))?;
+                let store = server(config, &url, token.clone())?;
+                Self { token, ..at(prefix, store) }
             }
             "file" => at(Path::default(), disk(&url)?),
             _ => return Err(wrong(format!("`{text}`"))),
         }))
+    }
+
+    /// A destination at the root of that store.
+    #[must_use]
+    pub fn over(name: String, store: Box<dyn ObjectStore>) -> Self {
+        Self { name, prefix: Path::default(), store, token: None }
     }
 
     /// Its url and endpoint, which hold no secret.
@@ -153,33 +95,77 @@ impl Destination {
     /// # Errors
     /// [`SendError`] unless exactly these bytes came back.
     pub async fn send(&self, key: &str, bytes: &[u8]) -> Result<(), SendError> {
-        let failed = |doing| move |error| SendError::Server { doing, message: self.message(&error) };
-        let differs = |found| SendError::Differs { key: key.to_owned(), found };
-        let path = self.prefix.parts().chain(Path::parse(key).iter().flat_map(Path::parts)).collect();
-        self.store.put(&path, bytes.to_vec().into()).await.map_err(failed("put"))?;
-        let back = match self.store.get(&path).await {
-            Err(object_store::Error::NotFound { .. }) => return Err(differs("nothing".into())),
-            back => back.map_err(failed("get"))?,
-        };
-        if back.meta.size != bytes.len() as u64 {
-            return Err(differs(format!("{} bytes in place of {}", back.meta.size, bytes.len())));
-        }
-        let (mut stream, mut hasher, mut read) = (back.into_stream(), blake3::Hasher::new(), 0);
-        while let Some(chunk) = stream.next().await {
-            let chunk = chunk.map_err(failed("get"))?;
-            read += chunk.len();
-            // A server that goes on after what it announced is not listened to.
-            if read > bytes.len() {
-                return Err(differs(format!("more than {} bytes", bytes.len())));
-            }
-            hasher.update(&chunk);
-        }
-        let found = hasher.finalize();
-        if found == blake3::hash(bytes) { Ok(()) } else { Err(differs(format!("bytes of BLAKE3 {found}"))) }
+        self.store.put(&self.path(key), bytes.to_vec().into()).await.map_err(|error| self.failed("put", &error))?;
+        let expected = "to read back what was sent";
+        let differs = |found| SendError::Differs { key: key.to_owned(), expected, found };
+        let back = self.read(key, bytes.len() as u64).await?.map_err(differs)?;
+        if back == bytes { Ok(()) } else { Err(differs(format!("bytes of BLAKE3 {}", hash(&back)))) }
     }
-}
 
-impl Destination {
+    /// The object, whose key names its hash as [`Destination::send`]'s callers have it: `.../HASH.EXTENSION`.
+    ///
+    /// # Errors
+    /// [`SendError`] unless bytes of that hash came back.
+    pub async fn fetch(&self, object: &Object) -> Result<Vec<u8>, SendError> {
+        let key = &object.key;
+        let expected = "the size that was listed and the hash that the key names";
+        let differs = |found| SendError::Differs { key: key.clone(), expected, found };
+        let bytes = self.read(key, object.size).await?.map_err(differs)?;
+        let (found, name) = (hash(&bytes), key.rsplit('/').next().and_then(|file| file.split('.').next()));
+        if name == Some(&found) { Ok(bytes) } else { Err(differs(format!("bytes of BLAKE3 {found}"))) }
+    }
+
+    /// What lies below a folder, by key.
+    ///
+    /// # Errors
+    /// [`SendError::Server`] when the server cannot list, or lists more than [`MAX_LISTED`] objects.
+    pub async fn list(&self, folder: &str) -> Result<Vec<Object>, SendError> {
+        let depth = self.prefix.parts_count();
+        let mut listed = self.store.list(Some(&self.path(folder)));
+        let mut objects = Vec::new();
+        while let Some(found) = listed.try_next().await.map_err(|error| self.failed("list", &error))? {
+            if objects.len() == MAX_LISTED {
+                let message = format!("{folder}: expected at most {MAX_LISTED} objects, found more");
+                return Err(SendError::Server { doing: "list", message });
+            }
+            let key = found.location.parts().skip(depth).collect::<Path>().to_string();
+            objects.push(Object { key, size: found.size });
+        }
+        objects.sort();
+        Ok(objects)
+    }
+
+    /// An object of that size, or what is wrong with it.
+    pub(super) async fn read(&self, key: &str, size: u64) -> Result<Result<Vec<u8>, String>, SendError> {
+        if size > MAX_OBJECT as u64 {
+            return Ok(Err(format!("{size} bytes, more than {MAX_OBJECT}")));
+        }
+        let back = match self.store.get(&self.path(key)).await {
+            Err(object_store::Error::NotFound { .. }) => return Ok(Err("nothing".into())),
+            back => back.map_err(|error| self.failed("get", &error))?,
+        };
+        if back.meta.size != size {
+            return Ok(Err(format!("{} bytes in place of {size}", back.meta.size)));
+        }
+        let (mut stream, mut bytes) = (back.into_stream(), Vec::new());
+        while let Some(chunk) = stream.next().await {
+            bytes.extend_from_slice(&chunk.map_err(|error| self.failed("get", &error))?);
+            // A server that goes on after what it announced is not listened to.
+            if bytes.len() as u64 > size {
+                return Ok(Err(format!("more than {size} bytes")));
+            }
+        }
+        Ok(Ok(bytes))
+    }
+
+    fn path(&self, key: &str) -> Path {
+        self.prefix.parts().chain(Path::parse(key).iter().flat_map(Path::parts)).collect()
+    }
+
+    fn failed(&self, doing: &'static str, error: &object_store::Error) -> SendError {
+        SendError::Server { doing, message: self.message(error) }
+    }
+
     /// What went wrong, short and without the token.
     fn message(&self, error: &object_store::Error) -> String {
         let text = chain(error);
@@ -237,7 +223,7 @@ fn server(config: &SyncConfig, url: &Url, token: Option<Secret>) -> Result<Box<d
     }
     let wire = Wire::new(config.ca_file.as_deref(), header)?;
     let options = ClientOptions::new().with_allow_http(url.scheme() == "http");
-    let builder = HttpBuilder::new().with_url(url.as_str()).with_client_options(options);
+    let builder = HttpBuilder::new().with_url(url.origin().ascii_serialization()).with_client_options(options);
     let store = builder.with_retry(once()).with_http_connector(wire).build();
     Ok(Box::new(store.map_err(|error| SyncError::Client { message: chain(&error) })?))
 }

@@ -2,7 +2,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
-use super::destination::SyncError;
+use super::error::SyncError;
 
 /// The right to sync a store, held until it is dropped or the program ends.
 #[derive(Debug)]

@@ -5,14 +5,15 @@ use serde::{Deserialize, Serialize};
 
 use super::backoff::Backoff;
 use super::clock::SyncClock;
-use super::destination::{Destination, SendError};
+use super::destination::Destination;
+use super::error::SendError;
 use super::pack::pack;
 use crate::error::CommandError;
 use crate::store::{Reader, Store, StoreError};
 use crate::tables;
 
 /// Why nothing is tried: the time in a certificate could not be judged.
-pub(super) const NO_TIME: &str = "waits until the clock is synchronised";
+pub(crate) const NO_TIME: &str = "waits until the clock is synchronised";
 
 /// Tries after which a batch lets newer plants go first: it may be the batch that is wrong and not the server.
 const STUBBORN: u32 = 8;

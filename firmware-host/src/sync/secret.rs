@@ -3,7 +3,7 @@ use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-use super::destination::SyncError;
+use super::error::SyncError;
 use crate::config::SyncConfig;
 
 /// Longest secret, bytes: a guess far above any key or token.

@@ -13,12 +13,12 @@ use rustls::RootCertStore;
 use rustls::pki_types::CertificateDer;
 use rustls::pki_types::pem::PemObject;
 
-use super::destination::SyncError;
+use super::error::SyncError;
 
 /// Most of a reply that is read, bytes, where it is no object of ours (spec/reliability.md 15).
 pub const MAX_REPLY: usize = 64 << 10;
-/// Most of an object, bytes: far above any that we send. The reader besides stops at the size it sent.
-const MAX_OBJECT: usize = 64 << 20;
+/// Most of an object or of a listing, bytes: above any that we send. Objects besides are read as far as their size.
+pub(super) const MAX_OBJECT: usize = 64 << 20;
 /// Longest wait for a connection, for the next byte, and for a whole request: guesses for a slow field link.
 const CONNECT: Duration = Duration::from_secs(15);
 const SILENCE: Duration = Duration::from_secs(30);
@@ -81,7 +81,8 @@ impl HttpConnector for Wire {
 #[async_trait]
 impl HttpService for Wire {
     async fn call(&self, request: HttpRequest) -> Result<HttpResponse, HttpError> {
-        let reading = request.method() == reqwest::Method::GET;
+        // WebDAV lists with a method of its own.
+        let reading = matches!(request.method().as_str(), "GET" | "PROPFIND");
         let (parts, body) = self.0.call(request).await?.into_parts();
         let limit = if reading && parts.status.is_success() { MAX_OBJECT } else { MAX_REPLY };
         let body = Limited::new(body, limit).map_err(|error| HttpError::new_boxed(HttpErrorKind::Decode, error));

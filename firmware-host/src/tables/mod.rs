@@ -4,11 +4,13 @@
 //! table of plants a WKB point as GeoParquet 1.1 wants it. docs/sync.md lists every column.
 
 mod columns;
+mod merge;
 mod traits;
 
 use std::collections::HashMap;
 
 use arrow_array::RecordBatch;
+use arrow_schema::SchemaRef;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
@@ -19,6 +21,7 @@ use serde_json::json;
 use crate::report::{OrganReport, word};
 use crate::store::WholePlant;
 use columns::Columns;
+pub use merge::{Merger, Table};
 pub use traits::{TRAITS, TraitColumn};
 
 /// A table of plants, one row each.
@@ -98,12 +101,16 @@ fn geo() -> KeyValue {
 }
 
 fn write(batch: RecordBatch, geo: Option<KeyValue>) -> Result<Vec<u8>, ParquetError> {
+    let mut writer = writer(batch.schema(), geo.into_iter().collect())?;
+    writer.write(&batch)?;
+    writer.into_inner()
+}
+
+fn writer(schema: SchemaRef, about: Vec<KeyValue>) -> Result<ArrowWriter<Vec<u8>>, ParquetError> {
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(concat!("demeter ", env!("CARGO_PKG_VERSION")).to_owned())
-        .set_key_value_metadata(geo.map(|geo| vec![geo]))
+        .set_key_value_metadata(Some(about).filter(|about| !about.is_empty()))
         .build();
-    let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties))?;
-    writer.write(&batch)?;
-    writer.into_inner()
+    ArrowWriter::try_new(Vec::new(), schema, Some(properties))
 }

@@ -211,6 +211,13 @@ impl Shared {
                 }
                 None => 404,
             },
+            (_, "PROPFIND") => match self.listing(&request.path) {
+                Some(listing) => {
+                    out = listing.into_bytes();
+                    207
+                }
+                None => 404,
+            },
             _ => 405,
         };
         if fault == Fault::CommitThenDrop {
@@ -239,6 +246,22 @@ impl Shared {
             self.send(wire, &[head.as_bytes(), &out].concat())?;
         }
         Ok(true)
+    }
+
+    /// What lies below a folder that is there, as WebDAV says it.
+    fn listing(&self, folder: &str) -> Option<String> {
+        let objects = self.objects.lock().unwrap();
+        let objects = objects.iter().filter(|(path, _)| path.starts_with(&format!("{folder}/")));
+        let line = |(path, object): (&String, &Vec<u8>)| {
+            format!(
+                "<D:response><D:href>{path}</D:href><D:propstat><D:status>HTTP/1.1 200 OK</D:status><D:prop>\
+                 <D:getlastmodified>Mon, 01 Jun 2026 10:00:00 GMT</D:getlastmodified><D:resourcetype/>\
+                 <D:getcontentlength>{}</D:getcontentlength></D:prop></D:propstat></D:response>",
+                object.len()
+            )
+        };
+        let lines: String = objects.map(line).collect();
+        (!lines.is_empty()).then(|| format!("<D:multistatus xmlns:D=\"DAV:\">{lines}</D:multistatus>"))
     }
 
     fn send(&self, wire: &mut BufReader<Box<dyn Wire>>, bytes: &[u8]) -> std::io::Result<()> {

@@ -5,7 +5,7 @@ pub(crate) mod daemon;
 pub(crate) mod depot;
 pub(crate) mod sync;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use demeter::report::{Kind, OrganReport, PlantReport};
 use demeter::store::{NewPlant, NewSession, Store};
@@ -48,6 +48,12 @@ pub(crate) fn row(species: &Species, plants: usize, id: &str) -> (Synthetic, Man
     let source = Synthetic::new(species, &plan, camera, 0, id.into()).unwrap();
     let manifest = source.manifest("soybean", &plan);
     (source, manifest)
+}
+
+/// Every file below a folder.
+pub(crate) fn walk(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
 }
 
 /// The store with so many plants in it.
