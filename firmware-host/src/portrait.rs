@@ -74,7 +74,7 @@ impl Portrait {
         camera: &Intrinsics,
     ) -> Result<Option<Self>, ReconstructError> {
         let Some(sketch) = Sketch::of(&Silhouette::of(&silhouette.picture)) else { return Ok(None) };
-        let raised = sketch.raised(&SideView { camera: silhouette.camera, depth, azimuth: 0.0 }, species);
+        let raised = sketch.raised(&SideView { camera: silhouette.camera, depth });
         let fitted = pictured(&raised.stem, &raised.blades, species, UP)?;
         let nodes = raised.blades.into_iter().flat_map(|blade| blade.nodes);
         let mut portrait = Self::described(

@@ -17,8 +17,10 @@ pub const NODES: Lattice = Lattice::every(4, 7);
 /// Steps from each start, and of the best.
 const TRIAL: usize = 3;
 const STEPS: usize = 15;
-/// Standard deviation of a node in the picture, pixels: edges wave (a guess).
-const PIXELS: f64 = 1.5;
+/// Standard deviation of a node in the picture, pixels: edges wave (tried: 1 to 2.5, docs/training.md).
+const PIXELS: f64 = 2.0;
+/// What the species' width counts beside a picture: what is seen across a turned blade is less than its width (a guess).
+const WIDTH_WEIGHT: f64 = 0.2;
 
 /// Where a picture shows a blade, in the frame of its camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -168,7 +170,11 @@ impl Pins {
             normal.prior(State::COEFFICIENTS + k, *value, 1.0);
         }
         let width = species.priors.ln_width;
-        normal.prior(State::COEFFICIENTS + coefficients - 1, state.log_width - width.mean, width.sd.powi(-2));
+        normal.prior(
+            State::COEFFICIENTS + coefficients - 1,
+            state.log_width - width.mean,
+            WIDTH_WEIGHT * width.sd.powi(-2),
+        );
         normal
     }
 }

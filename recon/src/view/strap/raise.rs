@@ -1,5 +1,4 @@
-//! Lines in the picture into space: what the picture shows of each organ stays where it is seen, depth comes of what is
-//! known of the species.
+//! Lines in the picture into space: each organ stays where the picture shows it, in the plane of its stem.
 
 use std::f64::consts::PI;
 
@@ -8,9 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::trace::{Sketch, Stroke};
 use crate::fit::{NODES, Pictured};
-use crate::model::Species;
-use crate::model::leaf::{ROWS, Side, VEIN, node};
-use crate::polyline::path_length;
+use crate::model::leaf::ROWS;
 use crate::statistics::quantile;
 
 /// Stations along a blade and a stem: enough for the waves of a strap.
@@ -24,9 +21,9 @@ const SMOOTH: f64 = 0.02;
 /// The same of their half widths: blades wave more often than their nodes can follow.
 const SMOOTH_WIDTH: f64 = 0.06;
 /// Standard deviation of a node's depth, in lengths of its blade. A looser one lets blades lean to one side, where pixels
-/// do not see it: at 0.15 one silhouette foretold eleven others with an overlap of 0.296, at 0.06 with 0.359
+/// do not see it: at 0.15 one silhouette foretold eleven others with an overlap of 0.296, at 0.04 with 0.386
 /// (docs/training.md).
-const OUT_OF_PLANE: f64 = 0.06;
+const OUT_OF_PLANE: f64 = 0.04;
 
 /// A view of a plant from the side by a level camera.
 #[derive(Clone, Copy, Debug)]
@@ -35,8 +32,6 @@ pub struct SideView {
     pub camera: Intrinsics,
     /// Depth of the plant's stem, metres.
     pub depth: f64,
-    /// Angle between the picture and the vertical plane in which the leaves stand, radians.
-    pub azimuth: f64,
 }
 
 /// A plant of a picture in space.
@@ -51,14 +46,13 @@ pub struct Raised {
 impl Sketch {
     /// The sketch in space.
     #[must_use]
-    pub fn raised(&self, view: &SideView, species: &Species) -> Raised {
-        let half_widths = half_widths(species);
+    pub fn raised(&self, view: &SideView) -> Raised {
         let stem = self.stem.stations();
         let radius = quantile(&stem.radii, STEM_QUANTILE).unwrap_or(1.0);
         let mut raised = Raised { stem: view.stem(&stem, radius), blades: Vec::new() };
         let pixel = view.depth / view.camera.fx;
         for blade in &self.blades {
-            let ribs = view.ribs(&blade.without_stem(radius).stations(), &half_widths);
+            let ribs = view.ribs(&blade.without_stem(radius).stations());
             raised.blades.push(Pictured { nodes: points(&ribs), pixel, depth: OUT_OF_PLANE });
         }
         raised
@@ -73,13 +67,6 @@ fn points(ribs: &[Rib]) -> Vec<DVec3> {
     let (step, across) = ((STATIONS - 1) / (NODES.rows() - 1), NODES.columns());
     let side = move |j: usize| 2.0 * j as f64 / (across - 1) as f64 - 1.0;
     ribs.iter().step_by(step).flat_map(|(middle, edge)| (0..across).map(move |j| *middle + *edge * side(j))).collect()
-}
-
-/// Half of a mean blade's width at each station, in blade lengths.
-fn half_widths(species: &Species) -> Vec<f64> {
-    let flat = species.leaf.flat(&vec![0.0; species.leaf.shape.rank()], species.priors.ln_width.mean.exp());
-    let edge = |row: usize, side: Side| flat[node(row, side.column(VEIN))].x;
-    (0..STATIONS).map(|row| (edge(row, Side::Right) - edge(row, Side::Left)) / 2.0).collect()
 }
 
 impl SideView {
@@ -98,28 +85,19 @@ impl SideView {
         points
     }
 
-    /// A blade's ribs: across in the picture as far as is seen, the rest of what the species is wide in depth. It shows
-    /// its upper face.
-    fn ribs(&self, blade: &Stroke, half_widths: &[f64]) -> Vec<Rib> {
-        let base = self.camera.unproject(blade.points[0], self.depth);
-        let place = |at: &DVec2| {
-            let flat = self.camera.unproject(*at, self.depth);
-            self.camera.unproject(*at, self.depth + (flat.x - base.x) * self.azimuth.tan())
-        };
-        let course: Vec<DVec3> = blade.points.iter().map(place).collect();
-        let length = path_length(course.iter().copied());
+    /// A blade's ribs, as wide as they are seen. It shows its upper face.
+    fn ribs(&self, blade: &Stroke) -> Vec<Rib> {
+        let course: Vec<DVec3> = blade.points.iter().map(|at| self.camera.unproject(*at, self.depth)).collect();
         let along: Vec<DVec3> = (0..course.len())
             .map(|k| (course[(k + 1).min(course.len() - 1)] - course[k.saturating_sub(1)]).normalize_or_zero())
             .collect();
         // The picture's y points down.
         let up = if along.iter().map(|along| along.x).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
-        let rib = |(k, along): (usize, &DVec3)| {
-            let seen = blade.radii[k] * course[k].z / self.camera.fx;
-            let hidden = ((half_widths[k] * length).powi(2) - seen * seen).max(0.0).sqrt();
-            let side = along.cross(DVec3::Z).normalize_or_zero();
-            (course[k], side * (seen * up) + DVec3::Z.reject_from(*along).normalize_or_zero() * hidden)
+        let rib = |((at, along), radius): ((&DVec3, &DVec3), &f64)| {
+            let seen = radius * self.depth / self.camera.fx;
+            (*at, along.cross(DVec3::Z).normalize_or_zero() * (seen * up))
         };
-        along.iter().enumerate().map(rib).collect()
+        course.iter().zip(&along).zip(&blade.radii).map(rib).collect()
     }
 }
 

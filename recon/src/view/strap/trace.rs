@@ -6,9 +6,11 @@ use super::network::Network;
 use super::silhouette::Silhouette;
 use crate::statistics::median;
 
-/// A stem goes on upwards while its direction keeps within about 40 degrees of both the vertical and the way from its foot
-/// (cosine; a guess: stems lean, blades leave them at more).
+/// A stem gains by what rises more than this part of its length, 40 degrees off the vertical (a guess: stems lean, blades
+/// leave them at more).
 const ONWARD: f64 = 0.77;
+/// What a full turn about costs a stem, in plant sizes (a guess).
+const STEM_TURN: f64 = 0.02;
 /// A foot stands under the middle of its plant: off it by this share of the plant's width it counts a third (a guess).
 const OFF_MIDDLE: f64 = 0.25;
 /// What a full turn about costs a blade on its way, in plant sizes, and what meeting the stem from below costs it: straps
@@ -105,48 +107,56 @@ impl Plant {
         self.network.lines[walk.0].length
     }
 
-    /// The main stem as walks from its foot to its last fork: of the ways up from every tip and joint the highest,
-    /// straightest, thickest and most central one.
+    /// The main stem as walks from its foot to its last fork: of the ways that rise most for their length the highest,
+    /// thickest and most central one.
     fn stem(&self) -> Option<Vec<Walk>> {
-        let starts = self.network.nodes.iter().flatten();
-        let rising = starts.filter(|&&(line, end)| -self.network.leaving(line, end).y > ONWARD);
-        let ways = rising.map(|&start| self.way_up(start)).filter(|way| !way.is_empty());
-        ways.max_by(|a, b| self.stem_score(a).total_cmp(&self.stem_score(b)))
-    }
-
-    fn way_up(&self, start: Walk) -> Vec<Walk> {
-        let up = DVec2::NEG_Y;
-        let mut way = vec![start];
-        let foot = self.place(self.start(start));
-        loop {
-            let last = way[way.len() - 1];
-            let so_far = (self.place(self.end(last)) - foot).normalize_or_zero();
-            let onward = |&walk: &Walk| {
-                let chord = (self.place(self.end(walk)) - self.place(self.start(walk))).normalize_or_zero();
-                let there = self.network.leaving(walk.0, walk.1);
-                (there.dot(up).min(there.dot(so_far)).min(chord.dot(so_far)), walk)
-            };
-            let next = self.network.nodes[self.end(last)].iter().filter(|(line, _)| way.iter().all(|w| w.0 != *line));
-            match next.map(onward).max_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((score, walk)) if score > ONWARD => way.push(walk),
-                _ => break,
-            }
-        }
+        let (gain, next) = self.ascents();
+        let score = |&start: &Walk| {
+            let way = climbed(start, &next);
+            let height = self.rise(start, way[way.len() - 1]);
+            let pixels = way.iter().flat_map(|walk| &self.network.lines[walk.0].pixels);
+            let thick = median(pixels.map(|&p| self.network.radius(p)).collect::<Vec<_>>()).unwrap_or(0.0);
+            let off = (self.place(self.start(start)).x - self.middle) / (OFF_MIDDLE * self.width).max(1.0);
+            (height * gain[key(start)] * thick).sqrt() * (-off * off).exp()
+        };
+        let starts = self.network.nodes.iter().flatten().copied().filter(|&start| gain[key(start)] > 0.0);
+        let foot = starts.max_by(|a, b| score(a).total_cmp(&score(b)))?;
+        let mut way = climbed(foot, &next);
         // What ends in a tip is the last blade and not the stem.
         if self.network.is_tip(self.end(way[way.len() - 1])) {
             way.pop();
         }
-        way
+        (!way.is_empty()).then_some(way)
     }
 
-    fn stem_score(&self, way: &[Walk]) -> f64 {
-        let stroke = self.stroke(way);
-        let (first, last) = (stroke.points[0], stroke.points[stroke.points.len() - 1]);
-        let length: f64 = way.iter().map(|walk| self.length(*walk)).sum();
-        let straight = first.distance(last) / length.max(1.0);
-        let thick = median(&stroke.radii).unwrap_or(0.0);
-        let off = (first.x - self.middle) / (OFF_MIDDLE * self.width).max(1.0);
-        (first.y - last.y).max(0.0) * straight.powi(4) * thick.sqrt() * (-off * off).exp()
+    /// How much higher the end of the last walk is than the start of the first.
+    fn rise(&self, first: Walk, last: Walk) -> f64 {
+        self.place(self.start(first)).y - self.place(self.end(last)).y
+    }
+
+    /// By `key`, how much the best way that begins with each walk rises beyond [`ONWARD`] of its length and its turns, and
+    /// the walk that follows. Every round trip loses, so there is a best way, and it passes nothing twice.
+    fn ascents(&self) -> (Vec<f64>, Vec<Option<Walk>>) {
+        let walks: Vec<Walk> = (0..self.network.lines.len()).flat_map(|line| [(line, 0), (line, 1)]).collect();
+        let own: Vec<f64> = walks.iter().map(|&walk| self.rise(walk, walk) - ONWARD * self.length(walk)).collect();
+        let (mut gain, mut next) = (own.clone(), vec![None; own.len()]);
+        for _ in 0..walks.len() {
+            let mut changed = false;
+            for &walk in &walks {
+                let here = self.arriving(walk);
+                for &onward in self.network.nodes[self.end(walk)].iter().filter(|onward| onward.0 != walk.0) {
+                    let turn = (1.0 - here.dot(self.network.leaving(onward.0, onward.1))) / 2.0;
+                    let through = own[key(walk)] + gain[key(onward)] - STEM_TURN * self.size * turn;
+                    if through > gain[key(walk)] {
+                        (gain[key(walk)], next[key(walk)], changed) = (through, Some(onward), true);
+                    }
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        (gain, next)
     }
 
     /// Ways from the stem to the tips of blades.
@@ -213,6 +223,11 @@ impl Plant {
         }
         stroke
     }
+}
+
+/// The way that begins with a walk.
+fn climbed(start: Walk, next: &[Option<Walk>]) -> Vec<Walk> {
+    std::iter::successors(Some(start), |&walk| next[key(walk)]).collect()
 }
 
 /// The cheapest way to the stem from every walk.
@@ -285,115 +300,4 @@ impl Ways {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use image::{GrayImage, Luma};
-
-    /// A brush stroke along a quadratic Bézier curve, its half width falling from `radius` to nothing at the end.
-    fn stroke(picture: &mut GrayImage, [a, b, c]: [DVec2; 3], radius: f64, taper: f64) {
-        for k in 0..=2000 {
-            let t = f64::from(k) / 2000.0;
-            let at = a.lerp(b, t).lerp(b.lerp(c, t), t);
-            let r = radius * (1.0 - taper * t);
-            for y in (at.y - r).floor() as i32..=(at.y + r).ceil() as i32 {
-                for x in (at.x - r).floor() as i32..=(at.x + r).ceil() as i32 {
-                    let inside = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5).distance(at) <= r;
-                    if inside && x >= 0 && y >= 0 && (x as u32) < picture.width() && (y as u32) < picture.height() {
-                        picture.put_pixel(x as u32, y as u32, Luma([255]));
-                    }
-                }
-            }
-        }
-    }
-
-    /// An upright stem with strap leaves: (height of the node, reach to the right, rise, fall of the tip below its top).
-    fn maize(leaves: &[(f64, f64, f64, f64)]) -> (GrayImage, Vec<f64>) {
-        let mut picture = GrayImage::new(400, 440);
-        let foot = DVec2::new(200.0, 420.0);
-        let top = leaves.iter().map(|leaf| leaf.0).fold(0.0, f64::max);
-        stroke(&mut picture, [foot, foot - DVec2::Y * top / 2.0, foot - DVec2::Y * top], 6.0, 0.3);
-        let mut lengths = Vec::new();
-        for &(node, reach, rise, fall) in leaves {
-            let from = foot - DVec2::Y * node;
-            let curve = [from, from + DVec2::new(reach * 0.5, -2.0 * rise), from + DVec2::new(reach, fall - rise)];
-            stroke(&mut picture, curve, 4.0, 0.8);
-            let at = |t: f64| curve[0].lerp(curve[1], t).lerp(curve[1].lerp(curve[2], t), t);
-            lengths.push((0..100).map(|k| at(f64::from(k) / 100.0).distance(at(f64::from(k + 1) / 100.0))).sum());
-        }
-        (picture, lengths)
-    }
-
-    fn length(stroke: &Stroke) -> f64 {
-        let few: Vec<DVec2> = stroke.points.iter().copied().step_by(5).chain(stroke.points.last().copied()).collect();
-        few.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
-    }
-
-    #[test]
-    fn leaves_are_counted_and_measured_lowest_first() {
-        let (picture, lengths) = maize(&[
-            (80.0, 120.0, 60.0, 40.0),
-            (140.0, -130.0, 70.0, 60.0),
-            (200.0, 110.0, 70.0, 20.0),
-            (260.0, -60.0, 100.0, 0.0),
-            (262.0, 40.0, 120.0, 0.0),
-        ]);
-        let sketch = Sketch::of(&Silhouette::of(&picture)).unwrap();
-        assert_eq!(sketch.blades.len(), lengths.len());
-        assert!((sketch.stem.points[0].x - 200.0).abs() < 5.0 && sketch.stem.points[0].y > 400.0);
-        for (blade, expected) in sketch.blades.iter().zip(&lengths).take(3) {
-            let found = length(blade);
-            assert!((found / expected - 1.0).abs() < 0.1, "{found} instead of {expected}");
-        }
-    }
-
-    #[test]
-    fn blades_go_straight_over_crossings() {
-        // The lower leaf's arch is crossed by the hanging tip of the upper one, well off the stem.
-        let (picture, lengths) = maize(&[
-            (60.0, 160.0, 110.0, 60.0),
-            (200.0, 160.0, 10.0, 160.0),
-            (240.0, -60.0, 100.0, 0.0),
-            (242.0, 40.0, 120.0, 0.0),
-        ]);
-        let sketch = Sketch::of(&Silhouette::of(&picture)).unwrap();
-        assert_eq!(sketch.blades.len(), 4);
-        let found: Vec<f64> = sketch.blades.iter().map(length).collect();
-        for (found, expected) in found.iter().zip(&lengths).take(2) {
-            assert!((found / expected - 1.0).abs() < 0.12, "{found} instead of {expected}");
-        }
-    }
-
-    #[test]
-    fn holes_between_blades_add_none() {
-        let leaves = [
-            (80.0, 120.0, 60.0, 40.0),
-            (140.0, -130.0, 70.0, 60.0),
-            (200.0, 160.0, 60.0, 40.0),
-            (260.0, -60.0, 100.0, 0.0),
-            (262.0, 40.0, 120.0, 0.0),
-        ];
-        let (mut picture, lengths) = maize(&leaves);
-        // From a blade's rise to its fall.
-        let ends = [DVec2::new(248.0, 168.0), DVec2::new(328.0, 169.0)];
-        stroke(&mut picture, [ends[0], ends[0].midpoint(ends[1]), ends[1]], 3.0, 0.0);
-        let sketch = Sketch::of(&Silhouette::of(&picture)).unwrap();
-        assert_eq!(sketch.blades.len(), lengths.len());
-    }
-
-    #[test]
-    fn what_has_no_stem_with_blades_is_no_grass() {
-        let mut disc = GrayImage::new(100, 100);
-        stroke(&mut disc, [DVec2::splat(50.0); 3], 30.0, 0.0);
-        let mut bar = GrayImage::new(100, 100);
-        stroke(&mut bar, [DVec2::new(50.0, 90.0), DVec2::new(50.0, 50.0), DVec2::new(50.0, 10.0)], 4.0, 0.0);
-        for picture in
-            [disc, bar, GrayImage::new(100, 100), GrayImage::new(0, 0), GrayImage::from_pixel(3, 9, Luma([1]))]
-        {
-            assert_eq!(Sketch::of(&Silhouette::of(&picture)), None);
-        }
-        // Noise has more lines than any plant, and must not take longer.
-        let mut rng = crate::world::seeded(1);
-        let noise = GrayImage::from_fn(400, 400, |_, _| Luma([u8::from(rand::Rng::random_bool(&mut rng, 0.4))]));
-        assert_eq!(Sketch::of(&Silhouette::of(&noise)), None);
-    }
-}
+mod tests;

@@ -260,12 +260,23 @@ fn length_misses(
     let (width, height) = photo.rgb.dimensions();
     let near = SAME_TIP * f64::from(width).hypot(f64::from(height));
     let length = |stroke: &Stroke| stroke.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum::<f64>();
-    let miss = |branch: &Stroke| {
-        let tip = *branch.points.last()?;
-        let (found, at) = blades.iter().min_by(|a, b| a.1.distance(tip).total_cmp(&b.1.distance(tip)))?;
-        (at.distance(tip) <= near).then(|| (found / smoothed_length(branch, length(branch)) - 1.0).abs())
-    };
-    Ok(sketch.blades.iter().filter_map(miss).collect())
+    let tip = |branch: &Stroke| branch.points[branch.points.len() - 1];
+    let mut pairs: Vec<(f64, usize, usize)> = (sketch.blades.iter().enumerate())
+        .flat_map(|(k, branch)| blades.iter().enumerate().map(move |(j, (_, at))| (at.distance(tip(branch)), k, j)))
+        .filter(|(away, ..)| *away <= near)
+        .collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // The nearest tips first: no blade is two branches.
+    let (mut branches, mut taken) = (vec![false; sketch.blades.len()], vec![false; blades.len()]);
+    let mut misses = Vec::new();
+    for (_, k, j) in pairs {
+        if !(branches[k] || taken[j]) {
+            (branches[k], taken[j]) = (true, true);
+            let branch = &sketch.blades[k];
+            misses.push((blades[j].0 / smoothed_length(branch, length(branch)) - 1.0).abs());
+        }
+    }
+    Ok(misses)
 }
 
 /// Length of a line of pixels without their steps: over every fifth pixel, never longer than the line.
