@@ -95,6 +95,17 @@ fn holes_between_blades_add_none() {
 }
 
 #[test]
+fn a_thin_foot_under_a_thick_whorl_is_the_stems() {
+    let (mut picture, _) = maize(&[(60.0, 150.0, 60.0, 40.0), (120.0, -150.0, 70.0, 60.0), (200.0, 120.0, 90.0, 20.0)]);
+    let whorl = [DVec2::new(200.0, 230.0), DVec2::new(204.0, 160.0), DVec2::new(212.0, 90.0)];
+    stroke(&mut picture, whorl, 15.0, 0.9);
+    let sketch = Sketch::of(&Silhouette::of(&picture)).unwrap();
+    let foot = sketch.stem.points[0];
+    assert!(foot.distance(DVec2::new(200.0, 420.0)) < 12.0, "the stem begins at {foot}");
+    assert_eq!(sketch.blades.len(), 4);
+}
+
+#[test]
 fn what_has_no_stem_with_blades_is_no_grass() {
     let mut disc = GrayImage::new(100, 100);
     stroke(&mut disc, [DVec2::splat(50.0); 3], 30.0, 0.0);
