@@ -29,6 +29,9 @@ const UPRIGHT: f64 = 0.7;
 /// A piece of main stem with less than this share of the largest one's pixels, and no continuation of another, is a scrap:
 /// the tip of a hanging blade, a dark edge. It roots no plant (a guess; plants in one picture are of a size).
 const SCRAP: f64 = 0.2;
+/// A leaf with less than this share of the pixels of its plant's largest is a speck: an edge, a petiole's end. Set after
+/// looking at one soybean, whose specks have up to 0.020 and whose smallest leaflet 0.25.
+const SPECK: f64 = 1.0 / 40.0;
 /// Share of points at either end of an organ that make its end.
 const END: f64 = 0.03;
 
@@ -62,6 +65,9 @@ pub enum GroupError {
     /// A scrap of main stem.
     #[error("expected a main stem of about the size of the others in the picture, found a scrap")]
     Scrap,
+    /// A speck of leaf.
+    #[error("expected leaves of about the size of the plant's largest, found a speck")]
+    Speck,
     /// No main stem, and too little to say where it would be.
     #[error("expected a main stem or at least two organs, found one organ")]
     NoMainStem,
@@ -102,6 +108,10 @@ pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Re
     let scrap = |stem: &Vec<usize>| Refused { instances: ids(stem), reason: GroupError::Scrap };
     let mut refused: Vec<Refused> = scraps.iter().map(scrap).collect();
     for (i, members) in plants.into_iter().enumerate() {
+        let (specks, members): (Vec<_>, Vec<_>) = members.iter().partition(|&&m| is_speck(organs, m, &members));
+        if !specks.is_empty() {
+            refused.push(Refused { instances: ids(&specks), reason: GroupError::Speck });
+        }
         let leaves = members.iter().filter(|&&m| organs[m].cloud.kind == OrganKind::Leaf).count();
         let instances = ids(&members);
         if leaves == 0 {
@@ -114,6 +124,12 @@ pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Re
     }
     views.sort_by_key(|plant| (std::cmp::Reverse(plant.pixels), plant.instances[0]));
     (views, refused)
+}
+
+fn is_speck(organs: &[LiftedOrgan], organ: usize, plant: &[usize]) -> bool {
+    let leaves = plant.iter().map(|&m| &organs[m]).filter(|organ| organ.cloud.kind == OrganKind::Leaf);
+    let largest = leaves.map(|leaf| leaf.region.pixels).max().unwrap_or(0) as f64;
+    organs[organ].cloud.kind == OrganKind::Leaf && (organs[organ].region.pixels as f64) < SPECK * largest
 }
 
 /// Main stems as lists of their pieces.
