@@ -1,5 +1,6 @@
 //! The configuration file: TOML, every key optional, unknown keys refused with a suggestion.
 
+mod brapi;
 mod lamp;
 mod sync;
 mod thermal;
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+pub use brapi::BrapiConfig;
 pub use camera::CameraConfig;
 pub use lamp::LampConfig;
 pub use sync::SyncConfig;

@@ -32,7 +32,8 @@ fn every_line_may_be_taken_out_of_its_comment_and_the_defaults_it_tells_are_true
     let all = load(&uncommented(|_| true)).unwrap();
     assert!(all.cameras.len() == 1 && all.source.is_some() && all.lamp.path.is_some() && all.lamp.buzzer.is_some());
     // What has no default is an example.
-    let sync = SyncConfig { url: None, endpoint: None, user: None, secret_file: None, ca_file: None, ..all.sync };
+    let sync =
+        SyncConfig { url: None, endpoint: None, user: None, secret_file: None, ca_file: None, brapi: None, ..all.sync };
     let examples = Config { source: None, cameras: Vec::new(), lamp: LampConfig::default(), sync, ..all };
     assert_eq!(examples, Config::default());
     // Each key alone, where its table is not a comment itself.
@@ -50,6 +51,9 @@ fn it_names_every_key_that_there_is() {
         let camera = value.as_array().and_then(|cameras| cameras.first()?.as_table());
         tables.extend(camera.map(|camera| (format!("[[{name}]]\n"), keys(camera))));
         tables.extend(value.as_table().map(|table| (format!("[{name}]\n"), keys(table))));
+        for (below, table) in value.as_table().into_iter().flatten() {
+            tables.extend(table.as_table().map(|table| (format!("[{name}.{below}]\n"), keys(table))));
+        }
     }
     for (header, told) in tables {
         // The parser's own list of what it knows; a tagged table has none and is looked at above.

@@ -9,8 +9,9 @@ use super::reply::ApiError;
 use crate::store::Outbox;
 use crate::sync::Report;
 
-/// Plants named in an answer: a hundred with their reasons stay below the 64 KiB that our own client reads.
+/// Plants named in an answer: these with their reasons stay below the 64 KiB that our own client reads.
 const NAMED: u32 = 100;
+const NAMED_UNITS: u32 = 20;
 
 /// GET /api/v1/sync: how the sync stands, what waits and why.
 #[derive(Debug, Serialize, Deserialize)]
@@ -19,11 +20,18 @@ pub struct SyncStatus {
     pub report: Report,
     /// What waits, the oldest plants by name.
     pub outbox: Outbox,
+    /// What waits for the BrAPI server, where there is one.
+    pub brapi: Option<Outbox>,
 }
 
 pub(super) async fn show(State(api): State<Api>) -> Result<Json<SyncStatus>, ApiError> {
+    let attendant = &api.inner.attendant;
     let outbox = api.read(|reader| reader.outbox(NAMED)).await?;
-    Ok(Json(SyncStatus { report: api.inner.attendant.report(), outbox }))
+    let brapi = match attendant.brapi() {
+        Some(name) => Some(api.read(move |reader| reader.units(&name, NAMED_UNITS)).await?),
+        None => None,
+    };
+    Ok(Json(SyncStatus { report: attendant.report(), outbox, brapi }))
 }
 
 /// POST /api/v1/sync/run: asks for a pass; `asked` is its number, which `report.ended` reaches when it is over.

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use crate::clock::SystemClock;
-use crate::config::Config;
+use crate::config::{BrapiConfig, Config};
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 use crate::report::columns;
-use crate::store::{Reader, Store};
+use crate::store::{Outbox, Reader, Store};
 use crate::sync::{Backoff, Pass, ask, open, until_done};
 
 /// Most plants that `--status` names.
@@ -70,22 +70,35 @@ fn told(pass: &Pass, output: &Output) -> Result<Exit, CommandError> {
         output.json(pass)?;
     } else {
         let why = pass.failure.as_ref().map_or_else(String::new, |failure| format!(" ({failure})"));
-        output.text(&format!("{} plants sent, {} wait{why}\n", pass.sent, pass.left))?;
+        let brapi = match (pass.observed, pass.unobserved) {
+            (0, 0) => String::new(),
+            (sent, wait) => format!("; BrAPI: {sent} sent, {wait} wait"),
+        };
+        output.text(&format!("{} plants sent, {} wait{brapi}{why}\n", pass.sent, pass.left))?;
     }
     // What waits is safe and goes another night: no failure, even where nothing was sent.
-    Ok(if pass.left == 0 { Exit::Done } else { Exit::Partial })
+    Ok(if pass.is_over() { Exit::Done } else { Exit::Partial })
 }
 
 fn status(reader: &Reader, config: &Config, output: &Output) -> Result<Exit, CommandError> {
     let outbox = reader.outbox(NAMED)?;
+    let brapi = config.sync.brapi.as_ref().map(BrapiConfig::name);
+    let units = brapi.as_ref().map(|name| reader.units(name, NAMED)).transpose()?;
     if output.json {
-        output.json(&json!({"destination": config.sync.url, "outbox": outbox}))?;
+        output.json(&json!({"destination": config.sync.url, "outbox": outbox, "brapi": units}))?;
         return Ok(Exit::Done);
     }
+    waiting(config.sync.url.as_deref().unwrap_or("nowhere, `sync.url` is not set"), &outbox, output)?;
+    if let (Some(name), Some(units)) = (brapi, units) {
+        waiting(&name, &units, output)?;
+    }
+    Ok(Exit::Done)
+}
+
+fn waiting(place: &str, outbox: &Outbox, output: &Output) -> Result<(), CommandError> {
     let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "-".into());
     output.text(&format!(
-        "to {}: {} plants wait, {} have left (the last at {})\n",
-        config.sync.url.as_deref().unwrap_or("nowhere, `sync.url` is not set"),
+        "to {place}: {} plants wait, {} have left (the last at {})\n",
         outbox.waiting,
         outbox.sent,
         or_dash(&outbox.last_sent)
@@ -98,9 +111,7 @@ fn status(reader: &Reader, config: &Config, output: &Output) -> Result<Exit, Com
         })
         .collect();
     if rows.is_empty() {
-        Ok(())
-    } else {
-        output.text(&columns(&["plant", "reason", "tries", "last try"], &rows, output.color))
-    }?;
-    Ok(Exit::Done)
+        return Ok(());
+    }
+    output.text(&columns(&["plant", "reason", "tries", "last try"], &rows, output.color))
 }

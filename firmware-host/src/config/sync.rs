@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
+use super::BrapiConfig;
+
 /// `[sync]`: where plants go at night (docs/sync.md). Without a `url` they stay on the box.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -24,6 +26,8 @@ pub struct SyncConfig {
     pub ca_file: Option<PathBuf>,
     /// The clock is right although systemd does not say so, as in a container. Certificates are verified all the same.
     pub trust_clock: bool,
+    /// A breeding database that takes the plants' traits, too.
+    pub brapi: Option<BrapiConfig>,
 }
 
 impl Default for SyncConfig {
@@ -37,6 +41,7 @@ impl Default for SyncConfig {
             secret_file: None,
             ca_file: None,
             trust_clock: false,
+            brapi: None,
         }
     }
 }

@@ -13,7 +13,11 @@ use super::error::{Doing, StoreError};
 pub const APPLICATION_ID: i32 = 0x444D_5452;
 
 /// One file a step of `user_version`; a file that has shipped never changes again.
-const MIGRATIONS: [&str; 2] = [include_str!("migrations/0001_first.sql"), include_str!("migrations/0002_sync.sql")];
+const MIGRATIONS: [&str; 3] = [
+    include_str!("migrations/0001_first.sql"),
+    include_str!("migrations/0002_sync.sql"),
+    include_str!("migrations/0003_brapi.sql"),
+];
 
 /// Settings of every connection and what SQLite must answer (spec/reliability.md "Storage" 3).
 const PRAGMAS: [(&str, &str); 6] = [

@@ -2,6 +2,7 @@
 //!
 //! [`Store`] writes, one at a time; [`Reader`] reads beside it. Neither knows the pipeline or the page.
 
+mod brapi;
 mod connection;
 mod error;
 mod outbox;

@@ -1,13 +1,12 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use reqwest::{RequestBuilder, StatusCode};
 use rustls::RootCertStore;
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 
+use super::answer::{Unanswered, answer};
 use super::attend::Report;
-use super::wire::{MAX_REPLY, builder};
+use super::wire::builder;
 use crate::api::SyncStatus;
 use crate::error::CommandError;
 
@@ -45,34 +44,4 @@ pub async fn ask(address: SocketAddr) -> Result<Option<Report>, CommandError> {
         }
         tokio::time::sleep(EVERY).await;
     }
-}
-
-#[derive(Debug, thiserror::Error)]
-enum Unanswered {
-    #[error("nobody")]
-    Nobody,
-    #[error("{0}")]
-    Http(#[from] reqwest::Error),
-    #[error("status {0}")]
-    Status(StatusCode),
-    #[error("{0}")]
-    Json(#[from] serde_json::Error),
-    #[error("an answer of more than {MAX_REPLY} bytes")]
-    TooLong,
-}
-
-async fn answer<T: DeserializeOwned>(request: RequestBuilder) -> Result<T, Unanswered> {
-    let sent = request.send().await;
-    let mut response = sent.map_err(|error| if error.is_connect() { Unanswered::Nobody } else { error.into() })?;
-    if !response.status().is_success() {
-        return Err(Unanswered::Status(response.status()));
-    }
-    let mut body = Vec::new();
-    while let Some(chunk) = response.chunk().await? {
-        body.extend_from_slice(&chunk);
-        if body.len() > MAX_REPLY {
-            return Err(Unanswered::TooLong);
-        }
-    }
-    Ok(serde_json::from_slice(&body)?)
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{Notify, oneshot};
 
 use super::backoff::{Backoff, SHORTEST};
+use super::brapi::Brapi;
 use super::clock::SyncClock;
 use super::destination::Destination;
 use super::lock::Lock;
@@ -12,7 +13,7 @@ use super::pack::PLANTS_A_TABLE;
 use super::pass::{Pass, PassError, Syncer};
 use super::ways::watch;
 use crate::clock::SystemClock;
-use crate::config::SyncConfig;
+use crate::config::{BrapiConfig, SyncConfig};
 use crate::error::CommandError;
 use crate::store::Store;
 
@@ -80,6 +81,12 @@ impl Attendant {
         self.config().url.clone()
     }
 
+    /// What the store knows the BrAPI server by, where there is one.
+    #[must_use]
+    pub fn brapi(&self) -> Option<String> {
+        self.config().brapi.as_ref().map(BrapiConfig::name)
+    }
+
     /// How it stands.
     #[must_use]
     pub fn report(&self) -> Report {
@@ -116,8 +123,8 @@ pub async fn attend<C: SyncClock>(
             let asked = attendant.report().asked;
             let config = attendant.config().clone();
             let pass = pass(&config, store, path, clock).await?;
-            let (done, brought) = (pass.left == 0 || config.url.is_none(), pass.objects > 0);
-            if done || brought {
+            let done = pass.is_over() || config.url.is_none();
+            if done || pass.brought() {
                 backoff.succeeded();
             }
             let wait = (!done).then(|| backoff.failed());
@@ -197,9 +204,10 @@ pub(crate) fn open<'a, C: SyncClock>(
     clock: C,
 ) -> Result<(Syncer<'a, C>, Lock), CommandError> {
     let destination = destination(config)?;
+    let brapi = config.brapi.as_ref().map(Brapi::open).transpose()?;
     let lock = Lock::take(path)?;
     let (reader, trusting) = (store.reader()?, config.trust_clock);
-    let syncer = Syncer { store, reader, destination, clock, trusting, plants_a_table: PLANTS_A_TABLE };
+    let syncer = Syncer { store, reader, destination, brapi, clock, trusting, plants_a_table: PLANTS_A_TABLE };
     Ok((syncer, lock))
 }
 

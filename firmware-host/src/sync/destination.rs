@@ -7,11 +7,10 @@ use object_store::local::LocalFileSystem;
 use object_store::path::Path;
 use object_store::{ClientOptions, ObjectStore, ObjectStoreExt, RetryConfig};
 use reqwest::Url;
-use reqwest::header::HeaderValue;
 
 use super::error::{SendError, SyncError};
-use super::secret::Secret;
-use super::wire::{MAX_OBJECT, Wire};
+use super::secret::{Secret, authorization};
+use super::wire::{MAX_OBJECT, Wire, encrypted};
 use crate::config::SyncConfig;
 use crate::error::chain;
 use crate::tables::hash;
@@ -183,7 +182,7 @@ fn once() -> RetryConfig {
 fn bucket(config: &SyncConfig, bucket: &str) -> Result<Box<dyn ObjectStore>, SyncError> {
     let missing = |key, expected| SyncError::Config { key, expected, found: "nothing".into() };
     let user = config.user.as_ref().ok_or_else(|| missing("user", "the access key id"))?;
-    let secret = Secret::load(config)?;
+    let secret = Secret::load(config.secret_file.as_deref(), &config.credential)?;
     let secret = secret.ok_or_else(|| missing("credential", "a systemd credential of that name, or `secret_file`"))?;
     let mut builder = AmazonS3Builder::new()
         .with_bucket_name(bucket)
@@ -206,7 +205,7 @@ fn bucket(config: &SyncConfig, bucket: &str) -> Result<Box<dyn ObjectStore>, Syn
 
 /// What an HTTP server wants to see: the secret itself, or user and secret in base64.
 fn token(config: &SyncConfig) -> Result<Option<Secret>, SyncError> {
-    let secret = Secret::load(config)?;
+    let secret = Secret::load(config.secret_file.as_deref(), &config.credential)?;
     Ok(secret.map(|secret| match &config.user {
         Some(user) => Secret::new(BASE64_STANDARD.encode(format!("{user}:{}", secret.reveal()))),
         None => secret,
@@ -216,27 +215,12 @@ fn token(config: &SyncConfig) -> Result<Option<Secret>, SyncError> {
 fn server(config: &SyncConfig, url: &Url, token: Option<Secret>) -> Result<Box<dyn ObjectStore>, SyncError> {
     encrypted("url", url)?;
     let scheme = if config.user.is_some() { "Basic" } else { "Bearer" };
-    let header = token.map(|token| HeaderValue::from_str(&format!("{scheme} {}", token.reveal()))).transpose();
-    let mut header = header.map_err(|error| SyncError::Client { message: error.to_string() })?;
-    if let Some(header) = &mut header {
-        header.set_sensitive(true);
-    }
+    let header = token.map(|token| authorization(scheme, &token)).transpose()?;
     let wire = Wire::new(config.ca_file.as_deref(), header)?;
     let options = ClientOptions::new().with_allow_http(url.scheme() == "http");
     let builder = HttpBuilder::new().with_url(url.origin().ascii_serialization()).with_client_options(options);
     let store = builder.with_retry(once()).with_http_connector(wire).build();
     Ok(Box::new(store.map_err(|error| SyncError::Client { message: chain(&error) })?))
-}
-
-/// Without TLS only this machine itself is spoken to.
-fn encrypted(key: &'static str, url: &Url) -> Result<(), SyncError> {
-    let host = url.host_str().unwrap_or_default();
-    let loopback =
-        host == "localhost" || host.trim_matches(['[', ']']).parse().is_ok_and(|ip: std::net::IpAddr| ip.is_loopback());
-    if url.scheme() == "https" || loopback {
-        return Ok(());
-    }
-    Err(SyncError::Config { key, expected: "https, except on this machine", found: url.to_string() })
 }
 
 /// The folder must be there: made by us, it would fill the box's own disk whenever the other is not mounted.

@@ -5,9 +5,11 @@
 //! its species file were read back with that hash. [`Syncer`] does one pass; [`attend`] is the daemon's loop around it.
 //! Objects are sent one by one and none is larger than about a megabyte, so a cut costs the one on its way.
 
+mod answer;
 mod ask;
 mod attend;
 mod backoff;
+mod brapi;
 mod clock;
 mod compact;
 mod destination;
@@ -24,6 +26,7 @@ pub use ask::ask;
 pub use attend::{Attendant, Report, attend, start};
 pub(crate) use attend::{destination, open};
 pub use backoff::Backoff;
+pub use brapi::Brapi;
 pub use clock::SyncClock;
 pub use compact::{CompactError, Compacted, LeftOut, Month, compact};
 pub use destination::{Destination, Object};

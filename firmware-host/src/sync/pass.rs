@@ -4,6 +4,7 @@ use parquet::errors::ParquetError;
 use serde::{Deserialize, Serialize};
 
 use super::backoff::Backoff;
+use super::brapi::Brapi;
 use super::clock::SyncClock;
 use super::destination::Destination;
 use super::error::SendError;
@@ -31,6 +32,8 @@ pub struct Syncer<'a, C> {
     pub reader: Reader,
     /// Where plants go.
     pub destination: Destination,
+    /// Where their traits go, too.
+    pub brapi: Option<Brapi>,
     /// The time, and whether it is right.
     pub clock: C,
     /// The clock is right whatever it says itself.
@@ -48,8 +51,26 @@ pub struct Pass {
     pub objects: usize,
     /// Plants that wait.
     pub left: u64,
+    /// Plants that arrived at the BrAPI server.
+    pub observed: usize,
+    /// Plants that wait for it.
+    pub unobserved: usize,
     /// Why some wait.
     pub failure: Option<String>,
+}
+
+impl Pass {
+    /// Nothing waits any more.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.left == 0 && self.unobserved == 0
+    }
+
+    /// Something arrived.
+    #[must_use]
+    pub fn brought(&self) -> bool {
+        self.objects > 0 || self.observed > 0
+    }
 }
 
 /// The store broke, or the tables could not be written.
@@ -98,12 +119,42 @@ impl<C: SyncClock> Syncer<'_, C> {
         let mut pass = Pass::default();
         if self.trusting || self.clock.trusted() {
             self.send(&mut pass).await?;
+            self.observe(&mut pass).await?;
         } else {
             self.store.note_waiting(NO_TIME)?;
             pass.failure = Some(NO_TIME.into());
         }
         pass.left = self.reader.summary()?.unsent;
+        if let Some(brapi) = &self.brapi {
+            pass.unobserved = self.reader.without_unit(&brapi.name())?.len();
+        }
         Ok(pass)
+    }
+
+    /// Each plant that is not at the BrAPI server, whether it has left otherwise or not.
+    async fn observe(&self, pass: &mut Pass) -> Result<(), PassError> {
+        let Some(brapi) = &self.brapi else { return Ok(()) };
+        let mut doubts = 0;
+        for seq in self.reader.without_unit(&brapi.name())? {
+            let Some(plant) = self.reader.whole(&[seq])?.pop() else { continue };
+            let refused = match brapi.send(&plant, self.reader.number_in_session(seq)?).await {
+                Ok(unit) => {
+                    self.store.save_unit(seq, &brapi.name(), &unit, self.clock.now())?;
+                    pass.observed += 1;
+                    continue;
+                }
+                Err(refused) => refused,
+            };
+            let reason = refused.to_string();
+            tracing::warn!("brapi: {reason}");
+            self.store.note_unit(seq, &brapi.name(), self.clock.now(), &reason)?;
+            pass.failure.get_or_insert(reason);
+            doubts += 1;
+            if matches!(refused, SendError::Server { .. }) || doubts == DOUBTS {
+                break;
+            }
+        }
+        Ok(())
     }
 
     async fn send(&self, pass: &mut Pass) -> Result<(), PassError> {
@@ -176,18 +227,24 @@ pub async fn until_done<C: SyncClock>(syncer: &Syncer<'_, C>, backoff: &mut Back
     let mut total = Pass::default();
     loop {
         let pass = syncer.pass().await?;
-        total = Pass { sent: total.sent + pass.sent, objects: total.objects + pass.objects, ..pass };
-        if total.left == 0 {
-            return Ok(total);
-        }
-        if pass.objects > 0 {
+        if pass.brought() {
             backoff.succeeded();
+        }
+        total = Pass {
+            sent: total.sent + pass.sent,
+            objects: total.objects + pass.objects,
+            observed: total.observed + pass.observed,
+            ..pass
+        };
+        if total.is_over() {
+            return Ok(total);
         }
         let wait = backoff.failed();
         if backoff.failures() >= FRUITLESS {
             return Ok(total);
         }
-        tracing::info!("sync: {} plants wait; next try in {} s", total.left, wait.as_secs());
+        let waiting = total.left.max(total.unobserved as u64);
+        tracing::info!("sync: {waiting} plants wait; next try in {} s", wait.as_secs());
         syncer.clock.sleep(wait).await;
     }
 }

@@ -3,8 +3,9 @@ use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
+use reqwest::header::HeaderValue;
+
 use super::error::SyncError;
-use crate::config::SyncConfig;
 
 /// Longest secret, bytes: a guess far above any key or token.
 const MAX_BYTES: u64 = 4096;
@@ -20,16 +21,16 @@ impl std::fmt::Debug for Secret {
 }
 
 impl Secret {
-    /// Reads it from `secret_file`, else from the systemd credential; `None` where there is neither.
+    /// Reads it from a file of ours, else from the systemd credential of that name; `None` where there is neither.
     ///
     /// # Errors
     /// [`SyncError`] when the file cannot be read, is open to others than its owner, or holds no plain text.
-    pub fn load(config: &SyncConfig) -> Result<Option<Self>, SyncError> {
-        if let Some(path) = &config.secret_file {
+    pub fn load(file: Option<&Path>, credential: &str) -> Result<Option<Self>, SyncError> {
+        if let Some(path) = file {
             return Self::read(path, true).map(Some);
         }
         let Some(folder) = std::env::var_os("CREDENTIALS_DIRECTORY") else { return Ok(None) };
-        let path = PathBuf::from(folder).join(&config.credential);
+        let path = PathBuf::from(folder).join(credential);
         // systemd guards its folder itself, with modes of its own.
         if path.exists() { Self::read(&path, false).map(Some) } else { Ok(None) }
     }
@@ -62,4 +63,12 @@ impl Secret {
     pub(super) fn reveal(&self) -> &str {
         &self.0
     }
+}
+
+/// The header that proves who we are, which is never printed.
+pub(super) fn authorization(scheme: &str, secret: &Secret) -> Result<HeaderValue, SyncError> {
+    let header = HeaderValue::from_str(&format!("{scheme} {}", secret.reveal()));
+    let mut header = header.map_err(|error| SyncError::Client { message: error.to_string() })?;
+    header.set_sensitive(true);
+    Ok(header)
 }

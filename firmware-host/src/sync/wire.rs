@@ -8,6 +8,7 @@ use object_store::ClientOptions;
 use object_store::client::{
     HttpClient, HttpConnector, HttpError, HttpErrorKind, HttpRequest, HttpResponse, HttpResponseBody, HttpService,
 };
+use reqwest::Url;
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderValue};
 use rustls::RootCertStore;
 use rustls::pki_types::CertificateDer;
@@ -38,6 +39,11 @@ impl Wire {
         let client = builder(roots(ca_file)?)?.default_headers(headers).timeout(REQUEST).build();
         Ok(Self(client.map_err(|error| SyncError::Client { message: error.to_string() })?))
     }
+
+    /// The client, for requests whose answers [`super::answer`] bounds.
+    pub(super) fn client(&self) -> &reqwest::Client {
+        &self.0
+    }
 }
 
 /// A client that verifies certificates by these roots and goes nowhere but where it is told to.
@@ -53,6 +59,17 @@ pub(super) fn builder(roots: RootCertStore) -> Result<reqwest::ClientBuilder, Sy
         .http1_only()
         .connect_timeout(CONNECT)
         .read_timeout(SILENCE))
+}
+
+/// Without TLS only this machine itself is spoken to.
+pub(super) fn encrypted(key: &'static str, url: &Url) -> Result<(), SyncError> {
+    let host = url.host_str().unwrap_or_default();
+    let loopback =
+        host == "localhost" || host.trim_matches(['[', ']']).parse().is_ok_and(|ip: std::net::IpAddr| ip.is_loopback());
+    if url.scheme() == "https" || loopback {
+        return Ok(());
+    }
+    Err(SyncError::Config { key, expected: "https, except on this machine", found: url.to_string() })
 }
 
 /// The certificates that are trusted.

@@ -50,6 +50,9 @@ pub(crate) struct Request {
     pub(crate) body: usize,
 }
 
+/// What answers in place of the objects: request and body give status and body. `true` where it must say that all is
+/// well and do nothing.
+type Answer = Box<dyn Fn(&Request, &[u8], bool) -> (u16, Vec<u8>) + Send + Sync>;
 type Plan = Box<dyn Fn(&Request) -> Fault + Send + Sync>;
 
 /// The server; it lives as long as this.
@@ -61,6 +64,7 @@ pub(crate) struct Depot {
 struct Shared {
     tls: Option<Arc<ServerConfig>>,
     plan: Mutex<Plan>,
+    answer: Option<Answer>,
     objects: Mutex<BTreeMap<String, Vec<u8>>>,
     requests: Mutex<Vec<Request>>,
     /// Connections, bytes that came in clear text or out of TLS, and bytes that went out.
@@ -72,11 +76,21 @@ struct Shared {
 
 impl Depot {
     pub(crate) fn start(tls: Option<ServerConfig>, plan: impl Fn(&Request) -> Fault + Send + Sync + 'static) -> Self {
+        Self::listen(tls, Box::new(plan), None)
+    }
+
+    /// A server of something else than objects.
+    pub(crate) fn with(answer: impl Fn(&Request, &[u8], bool) -> (u16, Vec<u8>) + Send + Sync + 'static) -> Self {
+        Self::listen(None, Box::new(|_| Fault::None), Some(Box::new(answer)))
+    }
+
+    fn listen(tls: Option<ServerConfig>, plan: Plan, answer: Option<Answer>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let shared = Arc::new(Shared {
             tls: tls.map(Arc::new),
-            plan: Mutex::new(Box::new(plan)),
+            plan: Mutex::new(plan),
+            answer,
             objects: Mutex::default(),
             requests: Mutex::default(),
             connections: AtomicU64::new(0),
@@ -195,6 +209,11 @@ impl Shared {
                 *status
             }
             (Fault::Redirect(_), _) => 307,
+            _ if let Some(answer) = &self.answer => {
+                let (status, answered) = answer(&request, &body, fault == Fault::WrongAcknowledgement);
+                out = answered;
+                status
+            }
             (_, "PUT") => {
                 let half = body[..body.len() / 2].to_vec();
                 match fault {

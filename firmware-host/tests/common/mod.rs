@@ -1,6 +1,7 @@
 //! A store in a temporary folder with a session, a species and a network, and plants to put into it.
 #![allow(dead_code)]
 
+pub(crate) mod brapi;
 pub(crate) mod daemon;
 pub(crate) mod depot;
 pub(crate) mod sync;

@@ -9,7 +9,7 @@ use std::time::Duration;
 use arrow_array::cast::AsArray;
 use arrow_array::{Array, RecordBatch};
 use demeter::config::SyncConfig;
-use demeter::sync::{Destination, Pass, SyncClock, Syncer};
+use demeter::sync::{Brapi, Destination, Pass, SyncClock, Syncer};
 use jiff::Timestamp;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
@@ -89,6 +89,7 @@ impl Bench {
             store: &self.store,
             reader: self.store.reader().unwrap(),
             destination,
+            brapi: config.brapi.as_ref().map(|config| Brapi::open(config).unwrap()),
             clock,
             trusting: false,
             plants_a_table: 16,
