@@ -23,6 +23,8 @@ const STATES = {
 // Where something is wrong, its colour and its reasons stand instead.
 const WRONG = { degraded: "wait", broken: "bad" };
 
+const CAMERA_WORDS = { starting: "starting", streaming: "works", lost: "no frames" };
+
 let known = null; // Plants in the store at the last look: the list is fetched again when it changes.
 let next = null;
 
@@ -55,7 +57,9 @@ async function poll() {
     const stage = ({ name, busy_seconds: busy, stuck }) =>
       cell(`${name}: ${stuck ? "stuck" : busy == null ? "waiting" : "busy"}`, "li");
     $("stages").replaceChildren(...status.stages.map(stage));
+    cameras(status.cameras);
     $("clock").textContent = status.time_trusted ? "" : "The clock is not set: times may be wrong.";
+    $("position").textContent = position(status.position);
     $("count-plants").textContent = status.store.plants;
     $("count-unsent").textContent = status.store.unsent;
     $("count-last").textContent = status.store.last_plant ? time(status.store.last_plant) : "none yet";
@@ -67,6 +71,41 @@ async function poll() {
     show("bad", "No answer", `The box does not answer: ${error.message}`);
   }
   setTimeout(poll, POLL_MS);
+}
+
+function position(receiver) {
+  if (!receiver?.last || receiver.state !== "fix") return "";
+  const { quality, accuracy_m: accuracy } = receiver.last;
+  return `Position: ${quality.replace("_", " ")}${accuracy == null ? "" : `, ± ${accuracy.toFixed(2)} m`}`;
+}
+
+// Cards stay where they are from one look to the next, so that their pictures do not flicker.
+function cameras(all) {
+  const cards = new Map([...$("cameras").children].map((card) => [card.dataset.id, card]));
+  $("cameras").replaceChildren(...all.map((camera) => look(cards.get(camera.id) ?? card(camera.id), camera)));
+}
+
+function card(id) {
+  const card = document.createElement("figure");
+  const picture = document.createElement("img");
+  card.dataset.id = id;
+  picture.alt = `What camera ${id} sees`;
+  picture.hidden = true;
+  picture.onload = () => { picture.hidden = false; };
+  card.append(picture, cell("", "figcaption"));
+  return card;
+}
+
+function look(card, camera) {
+  const [picture, caption] = card.children;
+  // Nobody looks at a page in the background, and a picture that is still on its way is not asked for twice.
+  if (!document.hidden && picture.complete) picture.src = `/api/v1/cameras/${encodeURIComponent(camera.id)}/preview.jpg?${Date.now()}`;
+  const lost = camera.missed + camera.dropped + camera.damaged;
+  const facts = [CAMERA_WORDS[camera.state], camera.rate && `${camera.rate.toFixed(1)} frames/s`, `${camera.frames} frames`, lost && `${lost} lost`];
+  const wrong = camera.lens ?? (camera.state === "lost" ? camera.last_error : null);
+  caption.replaceChildren(cell(camera.id, "strong"), cell(facts.filter(Boolean).join(", "), "span"), ...(wrong ? [cell(wrong, "em")] : []));
+  card.className = wrong ? "wrong" : "";
+  return card;
 }
 
 async function list(cursor) {

@@ -35,6 +35,8 @@ reasons! {
     UnknownCamera = "unknown_camera",
     /// A line of poses.jsonl is broken; the frame it was for comes without a pose.
     BadPose = "bad_pose",
+    /// A line of gnss.jsonl is broken; frames near its time may come without a position.
+    BadFix = "bad_fix",
     /// The frame's file lies outside the session's folder.
     UnsafePath = "unsafe_path",
     /// The frame's file is not there.

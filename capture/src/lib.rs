@@ -12,6 +12,8 @@
 //! and looks at exposure, sharpness and, over time, the lens ([`LensWatch`]). A frame that is no good ends in exactly one [`Reason`] and the run goes on; only
 //! a broken recording as a whole ([`SessionError`]) or a source that is gone ([`SourceError::Lost`]) stops it.
 //!
+//! A [`Receiver`] gives [`Positions`]: where the rig was at the time of a frame.
+//!
 //! Spec: appliance.md "Data path", "Cameras", "A recorded session"; reliability.md 23 and 24. The crate knows no network,
 //! plant or store.
 
@@ -26,21 +28,25 @@ mod libcamera;
 mod nokhwa;
 mod order;
 mod pixels;
+mod position;
 mod session;
 mod source;
 mod v4l2;
 
 pub use camera::{
     Backend, CameraFault, CameraHealth, CameraSettings, CameraState, Cameras, CamerasHealth, Controls, Mode, Mount,
-    longest_exposure, sampling,
+    Speed, longest_exposure, sampling,
 };
 pub use counts::{Counts, Reason};
 pub use gate::{Gate, GateConfig, Refusal, Verdict};
 pub use lens::{Lens, LensWatch};
 pub use pixels::{DecodeError, MAX_PIXELS, decode, decode_photo};
+pub use position::{
+    Fault, Fix, PositionHealth, PositionState, Positions, Quality, Receiver, ReceiverSettings, ReceiverSource,
+};
 pub use session::{
-    FileFault, FrameError, FrameFault, MAX_FRAME_BYTES, Manifest, ManifestError, Pace, Recorder, Replay, Row,
-    SCHEMA_VERSION, SessionCamera, SessionError,
+    FileFault, FrameError, FrameFault, ID, LONGEST_ARM, MAX_FRAME_BYTES, Manifest, ManifestError, Pace, Recorder,
+    Replay, Row, SCHEMA_VERSION, SessionCamera, SessionError, is_id,
 };
 pub use source::{CameraError, Source, SourceError};
 pub use v4l2::{Device, OfferedMode, devices};

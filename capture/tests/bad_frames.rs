@@ -353,7 +353,7 @@ fn bad_frames() {
     assert_eq!(gate.counts().refused_total(), KINDS.len() as u64);
     let never: Vec<_> = Reason::ALL.iter().filter(|reason| !expected.contains_key(reason)).collect();
     // Poses: tests/session.rs. What drivers mark as damaged has no frame to record: src/camera/tests.rs.
-    assert_eq!(never, [&Reason::BadPose, &Reason::DamagedBuffer], "every other counter is reached");
+    assert_eq!(never, [&Reason::BadPose, &Reason::BadFix, &Reason::DamagedBuffer], "every other counter is reached");
 }
 
 #[test]

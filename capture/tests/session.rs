@@ -160,7 +160,7 @@ fn a_poses_file_of_garbage_is_refused_within_bounds() {
     record(folder.path(), &[frame(1)]);
     fs::write(folder.path().join("poses.jsonl"), "garbage\n".repeat(2000)).expect("writes");
     let refused = Replay::open(folder.path(), Pace::Max);
-    assert!(matches!(refused, Err(SessionError::Poses { what: "broken lines", .. })), "{refused:?}");
+    assert!(matches!(refused, Err(SessionError::TooMany { what: "broken lines", .. })), "{refused:?}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod brapi;
 mod lamp;
+mod position;
 mod sync;
 mod thermal;
 
@@ -15,6 +16,7 @@ use serde::Deserialize;
 pub use brapi::BrapiConfig;
 pub use camera::CameraConfig;
 pub use lamp::LampConfig;
+pub use position::{PositionConfig, PositionSource, Side};
 pub use sync::SyncConfig;
 pub use thermal::ThermalConfig;
 
@@ -42,6 +44,8 @@ pub struct Config {
     pub thermal: ThermalConfig,
     /// What the driver sees and hears.
     pub lamp: LampConfig,
+    /// How the rig knows where it is.
+    pub position: PositionConfig,
     /// Where plants go at night.
     pub sync: SyncConfig,
     /// Where frames come from; without it stored plants are served and nothing else.
@@ -136,8 +140,10 @@ pub enum SourceConfig {
         /// The crop: a species that ships.
         #[serde(default = "soybean")]
         species: String,
-        /// How fast the rig drives, metres a second; negative when the row passes from left to right.
-        speed_m_per_s: f64,
+        /// How fast the rig drives, metres a second; negative when the row passes from left to right. Without it the
+        /// receiver of `[position]` measures the speed.
+        #[serde(default)]
+        speed_m_per_s: Option<f64>,
         /// Distance from plant to plant as sown, metres: what is seen much nearer belongs to the same plant.
         #[serde(default)]
         spacing_m: Option<f64>,
@@ -258,10 +264,10 @@ impl Config {
                 found: format!("{:?}", config.models.mask),
             });
         }
-        if let Some((key, expected, found)) = config.wrong_camera() {
-            return Err(ConfigError::Value { path: path.into(), key, expected, found });
+        match config.position.check().err().or_else(|| config.wrong_camera()) {
+            Some((key, expected, found)) => Err(ConfigError::Value { path: path.into(), key, expected, found }),
+            None => Ok(config),
         }
-        Ok(config)
     }
 
     fn wrong_camera(&self) -> Option<camera::BadValue> {
@@ -270,9 +276,11 @@ impl Config {
             if self.cameras.is_empty() {
                 return Some(("cameras", "at least one [[cameras]] for a source of this kind", "none".into()));
             }
-            if !(-20.0..=20.0).contains(speed_m_per_s) {
-                let found = speed_m_per_s.to_string();
-                return Some(("source.speed_m_per_s", "-20 to 20 metres a second", found));
+            if let Some(speed) = speed_m_per_s.filter(|speed| !(-20.0..=20.0).contains(speed)) {
+                return Some(("source.speed_m_per_s", "-20 to 20 metres a second", speed.to_string()));
+            }
+            if self.position.speed(*speed_m_per_s).is_none() {
+                return Some(("source.speed_m_per_s", "a speed, or a receiver in [position]", "neither".into()));
             }
             if let Some(spacing) = spacing_m.filter(|spacing| !(0.01..=10.0).contains(spacing)) {
                 return Some(("source.spacing_m", "0.01 to 10 metres", spacing.to_string()));
@@ -330,11 +338,22 @@ mod tests {
                 "[harvester]",
                 &[
                     "harvester",
-                    "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `sync`, `source`, `cameras`",
+                    "expected one of `store`, `api`, `models`, `thermal`, `lamp`, `position`, `sync`, `source`, `cameras`",
                 ],
             ),
             ("[[cameras]]\nid = 'left'", &["missing field `device`"]),
             ("[source]\nkind = 'cameras'\nspeed_m_per_s = 1", &["cameras", "at least one", "none"]),
+            (&LEFT.replace("left", "../left"), &["cameras.id", "letters, digits", "../left"]),
+            (&LEFT.replace("left", ""), &["cameras.id", "1 to 64", "\"\""]),
+            (
+                "[source]\nkind = 'cameras'\n[[cameras]]\nid = 'a'\ndevice = 'b'\nhfov_deg = 60\nheight_m = 1",
+                &["source.speed_m_per_s", "a receiver in [position]", "neither"],
+            ),
+            ("[position]\nsource = 'gps'", &["unknown variant `gps`", "`speed`, `gpsd`, `nmea`"]),
+            ("[position]\nlatency_s = nan", &["position.latency_s", "0 to 5 seconds", "NaN"]),
+            ("[position]\nbaud = 5", &["position.baud", "bits a second", "5"]),
+            ("[position]\ngpsd = 'here'", &["gpsd = 'here'", "address"]),
+            ("[position]\ncameras_from_antenna_m = [1, nan]", &["cameras_from_antenna_m", "20 metres", "NaN"]),
             (LEFT, &["cameras.tilt_deg", "-90 to 90", "-100"]),
             ("[[cameras]]\nid = 'left'\ndevise = 'usb'", &["devise", "did you mean `device`?"]),
             ("[store]\npath = 5", &["path = 5", "integer", "expected"]),

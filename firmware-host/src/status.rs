@@ -1,6 +1,6 @@
 //! What the daemon says about itself, on the page, through the API and by the lamp.
 
-use demeter_capture::CameraHealth;
+use demeter_capture::{CameraHealth, PositionHealth};
 use serde::Serialize;
 
 use crate::daemon::disk::Room;
@@ -19,8 +19,10 @@ pub struct Status {
     pub reasons: Vec<Reason>,
     /// The pipeline's stages; empty while none runs.
     pub stages: Vec<Stage>,
-    /// The rig's cameras; empty while they are no source.
-    pub cameras: Vec<CameraHealth>,
+    /// The rig's cameras; empty while nothing gives frames.
+    pub cameras: Vec<CameraStatus>,
+    /// The satellite receiver; none where there is none.
+    pub position: Option<PositionHealth>,
     /// Live frames dropped since the source started, because the box was busy.
     pub frames_dropped: u64,
     /// The wall clock is set by something that knows the time.
@@ -68,6 +70,16 @@ pub enum Activity {
     Finished,
     /// The pipeline stopped for this reason.
     Failed(String),
+}
+
+/// One camera.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CameraStatus {
+    /// How it does.
+    #[serde(flatten)]
+    pub health: CameraHealth,
+    /// What is wrong with its lens, one line; none as far as its pictures tell.
+    pub lens: Option<String>,
 }
 
 /// One stage of the pipeline.

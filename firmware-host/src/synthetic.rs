@@ -61,6 +61,7 @@ impl Synthetic {
             rig_id: "synthetic".into(),
             session_id: self.boot_id.clone(),
             species: species.into(),
+            cameras_from_antenna_m: None,
             cameras: vec![camera],
             rows: vec![SownRow { row: "1".into(), plot: None, plant_spacing_m: Some(plan.spacing) }],
         }

@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
@@ -10,9 +11,12 @@ use std::time::Duration;
 
 use common::{Bench, stored};
 use demeter::api::Api;
+use demeter::pipeline::Views;
 use demeter::report::Document;
-use demeter::status::{Activity, Health, Reason, Status};
+use demeter::status::{Activity, CameraStatus, Health, Reason, Status};
 use demeter::sync::Attendant;
+use demeter_capture::{CameraHealth, decode_photo};
+use demeter_frame::{CameraId, Frame, PixelFormat, Stamp};
 use metrics_exporter_prometheus::PrometheusBuilder;
 use serde_json::{Value, json};
 use tokio::sync::watch;
@@ -21,6 +25,7 @@ use tokio::sync::watch;
 struct Server {
     bench: Bench,
     status: watch::Sender<Status>,
+    views: Views,
     address: SocketAddr,
     _runtime: tokio::runtime::Runtime,
 }
@@ -48,10 +53,18 @@ fn server(plants: u32) -> Server {
     let listener = runtime.block_on(tokio::net::TcpListener::bind("127.0.0.1:0")).unwrap();
     let address = listener.local_addr().unwrap();
     let status = watch::Sender::new(Status::default());
+    let views = Views::default();
     let recorder = Arc::new(PrometheusBuilder::new().build_recorder());
-    let api = Api::new(bench.store.reader().unwrap(), status.subscribe(), Attendant::default(), recorder, address);
+    let api = Api::new(
+        bench.store.reader().unwrap(),
+        status.subscribe(),
+        views.clone(),
+        Attendant::default(),
+        recorder,
+        address,
+    );
     runtime.spawn(api.serve(listener, std::future::pending()));
-    Server { bench, status, address, _runtime: runtime }
+    Server { bench, status, views, address, _runtime: runtime }
 }
 
 impl Server {
@@ -251,6 +264,72 @@ fn the_page_is_whole_and_asks_nobody_else() {
     for ours in ["/", "/app.js", "/style.css"] {
         let text = String::from_utf8(server.get(ours).body).unwrap();
         assert!(!text.contains("://") && !text.contains("\"//"), "{ours} names another host");
+    }
+}
+
+#[test]
+fn cameras_are_shown_with_the_last_good_frame_which_is_encoded_once_a_second() {
+    let server = server(1);
+    assert_eq!(server.get("/api/v1/cameras").json(), json!({"cameras": []}));
+    let none = server.get("/api/v1/cameras/left/preview.jpg");
+    assert_eq!((none.status, none.error()), (404, "not_found".into()));
+    let health = CameraHealth { frames: 7, rate: Some(14.9), ..CameraHealth::new(CameraId("left".into()), "usb-1") };
+    let camera = CameraStatus { health, lens: Some("covered".into()) };
+    server.status.send_modify(|status| status.cameras = vec![camera]);
+    let left = &server.get("/api/v1/cameras").json()["cameras"][0];
+    assert_eq!((&left["id"], &left["frames"], &left["lens"]), (&"left".into(), &7.into(), &"covered".into()));
+
+    let frame = |width: u32, height: u32| Frame {
+        camera: CameraId("left".into()),
+        seq: 0,
+        stamp: Stamp { mono_ns: 0, wall: String::new(), boot_id: String::new() },
+        format: PixelFormat::Grey,
+        width,
+        height,
+        stride: width,
+        bytes: vec![99; (width * height) as usize].into(),
+        world_from_camera: None,
+    };
+    server.views.show(&frame(1280, 960));
+    let preview = server.get("/api/v1/cameras/left/preview.jpg");
+    assert!(preview.head.contains("content-type: image/jpeg"), "{}", preview.head);
+    let size = |jpeg: &[u8]| decode_photo(jpeg).map(|picture| picture.dimensions()).unwrap();
+    assert_eq!(size(&preview.body), (640, 480));
+    // Within the second nothing is encoded anew, whatever the camera gives; after it the newest frame is.
+    server.views.show(&frame(320, 200));
+    assert_eq!(server.get("/api/v1/cameras/left/preview.jpg").body, preview.body);
+    std::thread::sleep(Duration::from_millis(1100));
+    assert_eq!(size(&server.get("/api/v1/cameras/left/preview.jpg").body), (320, 200));
+}
+
+#[test]
+fn the_document_of_the_api_names_every_route_and_tells_the_truth() {
+    let server = server(1);
+    let document = server.get("/openapi.json").json();
+    let told: BTreeSet<_> = document["paths"].as_object().unwrap().keys().map(String::as_str).collect();
+    // Routes stand in three files, one call or one line of a table each.
+    let sources = [include_str!("../src/api/mod.rs"), include_str!("../src/api/page.rs")].concat();
+    let path = |text: &&str| text.starts_with('/') && text.len() > 1 && !text.starts_with("//") && *text != "/api/v1";
+    let quoted = sources.split('"').filter(path);
+    let page = ["/app.js", "/style.css", "/vendor/model-viewer.min.js"];
+    let beside = ["/healthz", "/metrics", "/openapi.json"];
+    let routes: Vec<_> = quoted
+        .filter(|path| !page.contains(path))
+        .map(|path| if beside.contains(&path) { path.to_owned() } else { format!("/api/v1{path}") })
+        .collect();
+    assert_eq!(told, routes.iter().map(String::as_str).collect());
+    for (path, item) in document["paths"].as_object().unwrap() {
+        let Some(responses) = item.get("get").map(|get| &get["responses"]) else { continue };
+        let answer = server.get(&path.replace("{id}", "row-0001"));
+        let response = &responses[answer.status.to_string()]["content"];
+        let (media, content) = response.as_object().unwrap().iter().next().unwrap();
+        assert!(answer.head.contains(&format!("content-type: {media}")), "{path}: {}", answer.head);
+        if media == "application/json" {
+            let mut schema = content["schema"].clone();
+            schema["components"] = document["components"].clone();
+            let told = jsonschema::validator_for(&schema).unwrap();
+            told.validate(&answer.json()).unwrap_or_else(|error| panic!("{path}: {error}"));
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 
 use common::{MODEL, bench};
 use demeter::error::{CommandError, Exit};
-use demeter::store::{APPLICATION_ID, NewPlant, NewSession, Reader, Saved, Store, StoreError};
+use demeter::store::{APPLICATION_ID, NewPlant, NewSession, Reader, Reserve, Saved, Store, StoreError};
 
 #[test]
 fn every_connection_has_the_pragmas_and_sqlite_is_new_enough() {
@@ -18,11 +18,14 @@ fn every_connection_has_the_pragmas_and_sqlite_is_new_enough() {
         ("trusted_schema", "0"),
         ("cell_size_check", "1"),
         ("mmap_size", "0"),
+        ("wal_autocheckpoint", "512"),
+        ("journal_size_limit", "2097152"),
         ("journal_mode", "wal"),
     ]
     .map(|(pragma, value)| (pragma, value.to_owned()));
     assert_eq!(bench.store.pragmas().unwrap(), expected);
     assert_eq!(bench.store.reader().unwrap().pragmas().unwrap(), expected);
+    assert_eq!(Reserve::BYTES, 2 * 2_097_152, "twice what the log is cut back to");
     assert_eq!(bench.number("PRAGMA application_id"), i64::from(APPLICATION_ID));
     // Negative control: a connection that sets nothing has other values, so the settings above are ours.
     assert_eq!(bench.number("PRAGMA cell_size_check"), 0);

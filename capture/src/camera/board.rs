@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use demeter_frame::Frame;
 
+use super::health::RATE_FRAMES;
 use super::{CameraFault, CameraHealth, CameraSettings, CameraState};
 use crate::{CameraError, SourceError};
 
@@ -32,6 +33,8 @@ struct Line {
     waiting: VecDeque<Arrival>,
     health: CameraHealth,
     last: Option<Instant>,
+    /// When the last frames were taken, nanoseconds; none since before the camera was lost.
+    stamps: VecDeque<u64>,
 }
 
 /// A frame, or the place of one that was damaged.
@@ -42,6 +45,12 @@ pub(super) struct Arrival {
 }
 
 impl Line {
+    /// Frames a second, as their stamps tell.
+    fn rate(&self) -> Option<f64> {
+        let seconds = self.stamps.back()?.checked_sub(*self.stamps.front()?)? as f64 * 1e-9;
+        (seconds > 0.0).then(|| (self.stamps.len() - 1) as f64 / seconds)
+    }
+
     /// Held by the frames that wait.
     fn bytes(&self) -> usize {
         self.waiting.iter().filter_map(|arrival| arrival.frame.as_ref().ok()).map(|frame| frame.bytes.len()).sum()
@@ -52,19 +61,9 @@ impl Board {
     pub(super) fn new(settings: &[CameraSettings]) -> Self {
         let line = |settings: &CameraSettings| Line {
             waiting: VecDeque::with_capacity(WAITING),
-            health: CameraHealth {
-                id: settings.id.clone(),
-                device: settings.device.clone(),
-                state: CameraState::Starting,
-                frames: 0,
-                damaged: 0,
-                missed: 0,
-                dropped: 0,
-                reopened: 0,
-                last_frame_age: None,
-                last_error: None,
-            },
+            health: CameraHealth::new(settings.id.clone(), &settings.device),
             last: None,
+            stamps: VecDeque::with_capacity(RATE_FRAMES + 1),
         };
         let cameras = settings.iter().map(line).collect();
         Self { lines: Mutex::new(Lines { stopping: false, cameras }), changed: Condvar::new() }
@@ -105,6 +104,10 @@ impl Board {
         }
         line.health.state = CameraState::Streaming;
         line.last = Some(Instant::now());
+        line.stamps.push_back(arrival.mono_ns);
+        if line.stamps.len() > RATE_FRAMES + 1 {
+            line.stamps.pop_front();
+        }
         line.waiting.push_back(arrival);
         while line.waiting.len() > WAITING || line.waiting.len() > 1 && line.bytes() > WAITING_BYTES {
             line.waiting.pop_front();
@@ -120,7 +123,9 @@ impl Board {
             message = format!("{message}: {cause}");
         }
         let mut lines = self.lines();
-        let health = &mut lines.cameras[camera].health;
+        let line = &mut lines.cameras[camera];
+        line.stamps.clear();
+        let health = &mut line.health;
         if health.last_error.as_ref() != Some(&message) || health.state == CameraState::Streaming {
             tracing::warn!("camera {}: {message}", health.id);
         }
@@ -143,6 +148,7 @@ impl Board {
 
     pub(super) fn health(&self) -> Vec<CameraHealth> {
         let aged = |line: &Line| CameraHealth {
+            rate: line.rate(),
             last_frame_age: line.last.map(|last| last.elapsed().as_secs_f64()),
             ..line.health.clone()
         };

@@ -9,7 +9,7 @@ use super::board::Board;
 use super::driver::Driver;
 use super::supervisor::{Patience, Supervisor};
 use super::{Backend, CameraHealth, CameraSettings};
-use crate::{Source, SourceError, libcamera, v4l2};
+use crate::{Positions, Source, SourceError, libcamera, v4l2};
 
 /// How long [`Source::next`] waits before it says that all is quiet.
 const QUIET: Duration = Duration::from_millis(500);
@@ -44,28 +44,30 @@ impl CamerasHealth {
 }
 
 impl Cameras {
-    /// Begins to open the cameras; those that are not there yet are waited for.
+    /// Begins to open the cameras; those that are not there yet are waited for. `positions` tell how fast the rig drives
+    /// where the settings do not.
     ///
     /// # Errors
     /// The system's, when it gives no threads.
-    pub fn open(settings: &[CameraSettings]) -> io::Result<Self> {
-        Self::with(settings, driver, Patience::default())
+    pub fn open(settings: &[CameraSettings], positions: &Positions) -> io::Result<Self> {
+        Self::with(settings, positions, driver, Patience::default())
     }
 
     pub(super) fn with(
         settings: &[CameraSettings],
+        positions: &Positions,
         driver: impl Fn(&CameraSettings) -> Box<dyn Driver>,
         patience: Patience,
     ) -> io::Result<Self> {
-        let boot_id: Arc<str> = std::fs::read_to_string(BOOT_ID)?.trim().into();
+        let boot_id: Arc<str> = boot_id()?.into();
         let start_ns = monotonic_ns();
         let mut cameras = Self { board: Arc::new(Board::new(settings)), threads: Vec::new() };
         for (index, camera) in settings.iter().enumerate() {
             let (board, boot_id, driver) = (cameras.board.clone(), boot_id.clone(), driver(camera));
-            let (id, rate, mount) = (camera.id.clone(), camera.mode.rate, camera.mount);
-            let thread = std::thread::Builder::new().name(format!("camera {id}")).spawn(move || {
+            let (settings, positions) = (camera.clone(), positions.clone());
+            let thread = std::thread::Builder::new().name(format!("camera {}", camera.id)).spawn(move || {
                 let (boot_id, board) = (&*boot_id, &*board);
-                Supervisor { index, id, driver, rate, mount, boot_id, start_ns, patience, board }.run();
+                Supervisor { index, settings, driver, positions, boot_id, start_ns, patience, board }.run();
             });
             cameras.threads.push(thread?);
         }
@@ -104,6 +106,11 @@ fn driver(settings: &CameraSettings) -> Box<dyn Driver> {
         #[cfg(feature = "nokhwa")]
         Backend::Nokhwa => Box::new(crate::nokhwa::Camera::new(settings)),
     }
+}
+
+/// Which boot this is, as the kernel tells.
+pub(crate) fn boot_id() -> io::Result<String> {
+    Ok(std::fs::read_to_string(BOOT_ID)?.trim().to_owned())
 }
 
 /// CLOCK_MONOTONIC, nanoseconds: what the kernel stamps frames with.

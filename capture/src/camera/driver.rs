@@ -18,6 +18,9 @@ pub(crate) trait Stream {
 
     /// The next frame, or `None` when none came in `wait`.
     fn grab(&mut self, wait: Duration) -> Result<Option<Shot>, CameraFault>;
+
+    /// Sets the longest exposure, seconds, while it streams. A camera that cannot do that keeps what it was opened with.
+    fn limit_exposure(&mut self, _longest: f64) {}
 }
 
 /// What a camera said its frames would be, checked against what was asked for.

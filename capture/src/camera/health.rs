@@ -14,6 +14,9 @@ pub enum CameraState {
     Lost,
 }
 
+/// Frames that a rate is taken over.
+pub(super) const RATE_FRAMES: usize = 30;
+
 /// How a camera does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CameraHealth {
@@ -23,6 +26,8 @@ pub struct CameraHealth {
     pub device: String,
     /// What it is doing.
     pub state: CameraState,
+    /// Frames that come a second, over the last [`RATE_FRAMES`]; none unless they come.
+    pub rate: Option<f64>,
     /// Frames that came whole.
     pub frames: u64,
     /// Frames that the driver marked as damaged.
@@ -37,4 +42,24 @@ pub struct CameraHealth {
     pub last_frame_age: Option<f64>,
     /// What was last wrong with it.
     pub last_error: Option<String>,
+}
+
+impl CameraHealth {
+    /// A camera before its first frame.
+    #[must_use]
+    pub fn new(id: CameraId, device: &str) -> Self {
+        Self {
+            id,
+            device: device.into(),
+            state: CameraState::Starting,
+            rate: None,
+            frames: 0,
+            damaged: 0,
+            missed: 0,
+            dropped: 0,
+            reopened: 0,
+            last_frame_age: None,
+            last_error: None,
+        }
+    }
 }

@@ -15,8 +15,8 @@ mod supervisor;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use cameras::monotonic_ns;
 pub use cameras::{Cameras, CamerasHealth};
+pub(crate) use cameras::{boot_id, monotonic_ns};
 pub use fault::CameraFault;
 pub use health::{CameraHealth, CameraState};
-pub use settings::{Backend, CameraSettings, Controls, Mode, Mount, longest_exposure, sampling};
+pub use settings::{Backend, CameraSettings, Controls, Mode, Mount, Speed, longest_exposure, sampling};

@@ -16,6 +16,8 @@ pub struct CameraSettings {
     pub controls: Controls,
     /// How it is carried, when frames are to have poses.
     pub mount: Option<Mount>,
+    /// How far the rig may go during an exposure, metres, where its speed is measured: the longest exposure follows it.
+    pub smear: Option<f64>,
 }
 
 /// The driver stack of a camera.
@@ -62,7 +64,7 @@ pub struct Controls {
     pub white_balance: Option<i32>,
 }
 
-/// A camera that is driven along a row at one speed: the poses of a rig without a position.
+/// A camera that is driven along a row: the poses of a rig that knows its speed.
 ///
 /// The world's x axis points along the drive from where the cameras were opened, z up from the ground, and the camera looks
 /// along y.
@@ -72,15 +74,27 @@ pub struct Mount {
     pub height: f64,
     /// Height of the optical axis above the horizon, radians; negative when it looks down.
     pub pitch: f64,
-    /// Speed of the drive, metres a second; negative when the row passes from left to right.
-    pub speed: f64,
+    /// How fast it is driven.
+    pub speed: Speed,
+}
+
+/// How fast a rig drives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Speed {
+    /// Metres a second, always; negative when the row passes from left to right.
+    Given(f64),
+    /// As the satellite receiver measures it.
+    Measured {
+        /// The cameras look to the right of the drive: the row passes from left to right.
+        rightwards: bool,
+    },
 }
 
 impl Mount {
-    /// `world_from_camera` so many seconds after the cameras were opened.
+    /// `world_from_camera` at so many metres along the world's x axis from where the cameras were opened.
     #[must_use]
-    pub fn pose(&self, seconds: f64) -> Pose {
-        let eye = DVec3::new(self.speed * seconds, 0.0, self.height);
+    pub fn pose(&self, way: f64) -> Pose {
+        let eye = DVec3::new(way, 0.0, self.height);
         let (sin, cos) = self.pitch.sin_cos();
         Pose::looking_at(eye, eye + DVec3::new(0.0, cos, sin), DVec3::Z)
     }
@@ -112,9 +126,9 @@ mod tests {
         let intrinsics = Intrinsics::from_hfov(1920, 1080, 1.1);
         for (speed, distance, blur) in [(0.5, 0.9, 1.0), (2.0, 0.6, 1.5), (-1.2, 1.4, 0.5)] {
             let seconds = longest_exposure(speed, sampling(distance, intrinsics.fx), blur);
-            let mount = Mount { height: 1.0, pitch: 0.0, speed };
+            let mount = Mount { height: 1.0, pitch: 0.0, speed: Speed::Given(speed) };
             let plant = DVec3::new(0.2, distance, 1.1);
-            let seen = |t| intrinsics.project(mount.pose(t).inverse().point(plant)).unwrap();
+            let seen = |t| intrinsics.project(mount.pose(speed * t).inverse().point(plant)).unwrap();
             let moved = seen(seconds).distance(seen(0.0));
             assert!((moved - blur).abs() < 1e-9, "{moved} pixels, {blur} allowed");
         }
@@ -123,8 +137,8 @@ mod tests {
 
     #[test]
     fn a_mount_keeps_height_and_tilt_and_drives_along_x() {
-        let mount = Mount { height: 1.3, pitch: -0.4, speed: 0.8 };
-        let camera = Pinhole { intrinsics: Intrinsics::from_hfov(64, 48, 1.0), world_from_camera: mount.pose(2.5) };
+        let mount = Mount { height: 1.3, pitch: -0.4, speed: Speed::Given(0.8) };
+        let camera = Pinhole { intrinsics: Intrinsics::from_hfov(64, 48, 1.0), world_from_camera: mount.pose(2.0) };
         assert!((camera.world_from_camera.translation - DVec3::new(2.0, 0.0, 1.3)).length() < 1e-12);
         assert!((camera.tilt().pitch + 0.4).abs() < 1e-12 && camera.tilt().roll.abs() < 1e-12);
     }

@@ -1,13 +1,13 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use demeter_frame::{CameraId, Frame, Stamp};
+use demeter_frame::{Frame, Pose, Stamp};
 
 use super::board::{Arrival, Board};
 use super::driver::{Driver, Shot, Stream};
 use super::sequence::Sequence;
-use super::{CameraFault, Mount};
-use crate::CameraError;
+use super::{CameraFault, CameraSettings, Speed, longest_exposure};
+use crate::{CameraError, Positions};
 
 /// How long a camera may take over things.
 #[derive(Clone, Copy, Debug)]
@@ -42,10 +42,9 @@ const GLANCE: Duration = Duration::from_millis(200);
 /// One camera's thread: opens it, passes its frames on, and begins again whenever something goes wrong.
 pub(super) struct Supervisor<'a> {
     pub(super) index: usize,
-    pub(super) id: CameraId,
+    pub(super) settings: CameraSettings,
     pub(super) driver: Box<dyn Driver>,
-    pub(super) rate: f64,
-    pub(super) mount: Option<Mount>,
+    pub(super) positions: Positions,
     pub(super) boot_id: &'a str,
     /// Where the world begins: the monotonic time at which the cameras were opened.
     pub(super) start_ns: u64,
@@ -81,10 +80,15 @@ impl Supervisor<'_> {
 
     /// Passes frames on until it is to stop.
     fn pump(&self, stream: &mut dyn Stream, sequence: &mut Sequence) -> Result<(), CameraFault> {
-        let three = Duration::try_from_secs_f64(3.0 / self.rate).unwrap_or_default();
+        let three = Duration::try_from_secs_f64(3.0 / self.settings.mode.rate).unwrap_or_default();
         let stall = self.patience.stall.max(three);
         let (mut patience, mut since) = (self.patience.first.max(stall), Instant::now());
+        let mut exposure = Exposure::default();
         while !self.board.stopping() {
+            if let Some(longest) = self.settings.smear.and_then(|smear| exposure.follow(smear, self.positions.speed()?))
+            {
+                stream.limit_exposure(longest);
+            }
             match stream.grab(GLANCE.min(stall))? {
                 Some(shot) => {
                     let (seq, missed) = sequence.number(shot.count);
@@ -101,12 +105,11 @@ impl Supervisor<'_> {
 
     fn frame(&self, stream: &dyn Stream, shot: Shot, seq: u64) -> Result<Frame, CameraError> {
         if shot.damaged {
-            return Err(CameraError { camera: self.id.clone(), seq });
+            return Err(CameraError { camera: self.settings.id.clone(), seq });
         }
         let layout = stream.layout();
-        let seconds = shot.mono_ns.saturating_sub(self.start_ns) as f64 * 1e-9;
         Ok(Frame {
-            camera: self.id.clone(),
+            camera: self.settings.id.clone(),
             seq,
             stamp: Stamp {
                 mono_ns: shot.mono_ns,
@@ -118,7 +121,49 @@ impl Supervisor<'_> {
             height: layout.height,
             stride: layout.stride,
             bytes: shot.bytes,
-            world_from_camera: self.mount.map(|mount| mount.pose(seconds)),
+            world_from_camera: self.pose(shot.mono_ns),
         })
+    }
+
+    /// Where the camera stood; unknown where the rig's speed is to be measured and is not.
+    fn pose(&self, mono_ns: u64) -> Option<Pose> {
+        let mount = self.settings.mount?;
+        let way = match mount.speed {
+            Speed::Given(speed) => speed * (mono_ns.saturating_sub(self.start_ns) as f64 * 1e-9),
+            Speed::Measured { rightwards } => self.positions.driven(mono_ns)? * if rightwards { -1.0 } else { 1.0 },
+        };
+        Some(mount.pose(way))
+    }
+}
+
+/// The exposure's limit while the speed is measured.
+#[derive(Debug, Default)]
+struct Exposure {
+    longest: Option<f64>,
+}
+
+impl Exposure {
+    /// Changes of the speed by a smaller share leave the limit: a camera needs a frame or two to follow (a guess).
+    const STEADY: f64 = 0.2;
+    /// Below this, metres a second, the rig stands, whatever the receiver's noise says.
+    const STANDS: f64 = 0.05;
+
+    /// The longest exposure in which the rig goes by `smear` metres at most, where it is to be set anew.
+    fn follow(&mut self, smear: f64, speed: f64) -> Option<f64> {
+        let longest = longest_exposure(speed.max(Self::STANDS), smear, 1.0);
+        let same = self.longest.is_some_and(|before| (before - longest).abs() <= Self::STEADY * before);
+        (!same).then(|| *self.longest.insert(longest))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Exposure;
+
+    #[test]
+    fn the_exposure_follows_the_speed_and_not_its_noise() {
+        let mut exposure = Exposure::default();
+        let limits = [1.0, 1.1, 0.95, 2.0, 0.0, 0.01, 1.0].map(|speed| exposure.follow(0.002, speed));
+        assert_eq!(limits, [Some(0.002), None, None, Some(0.001), Some(0.04), None, Some(0.002)]);
     }
 }

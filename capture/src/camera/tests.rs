@@ -9,7 +9,7 @@ use demeter_frame::{CameraId, PixelFormat};
 use super::driver::{Driver, Layout, Shot, Stream};
 use super::supervisor::Patience;
 use super::*;
-use crate::{Reason, Source, SourceError};
+use crate::{Positions, Reason, Source, SourceError};
 
 /// What a made-up camera does next.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +79,8 @@ fn settings(id: &str) -> CameraSettings {
         backend: Backend::V4l2,
         mode: Mode { format: PixelFormat::Grey, width: 2, height: 1, rate: 1000.0 },
         controls: Controls::default(),
-        mount: Some(Mount { height: 1.0, pitch: 0.0, speed: 1.0 }),
+        mount: Some(Mount { height: 1.0, pitch: 0.0, speed: Speed::Given(1.0) }),
+        smear: None,
     }
 }
 
@@ -90,7 +91,8 @@ fn open(cameras: &[(&str, Vec<Vec<Act>>)]) -> Cameras {
     let millis = Duration::from_millis;
     let patience =
         Patience { first: millis(20), stall: millis(20), absent: millis(5), retry: millis(1), longest: millis(5) };
-    Cameras::with(&settings, |settings| Box::new(actors[&settings.id.0].clone()), patience).unwrap()
+    Cameras::with(&settings, &Positions::default(), |settings| Box::new(actors[&settings.id.0].clone()), patience)
+        .unwrap()
 }
 
 /// What comes until all is quiet: camera and number of each frame, and the reasons of those lost.

@@ -1,13 +1,13 @@
 use std::io;
 use std::path::PathBuf;
 
-use super::{FileFault, ManifestError, POSES};
+use super::{FIXES, FileFault, ManifestError, POSES};
 use crate::Reason;
 
 /// Why a session as a whole cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// session.toml, index.jsonl or poses.jsonl cannot be opened.
+    /// session.toml, index.jsonl, poses.jsonl or gnss.jsonl cannot be opened.
     #[error("session {}: {file}", path.display())]
     File {
         /// The session's folder.
@@ -39,15 +39,21 @@ pub enum SessionError {
         /// The folder.
         path: PathBuf,
     },
-    /// poses.jsonl holds more poses than a session has frames, or little but broken lines.
+    /// poses.jsonl or gnss.jsonl holds more than a session can have, or little but broken lines.
     #[error("{}: expected at most {limit} {what}, found more", path.display())]
-    Poses {
-        /// The poses.jsonl.
+    TooMany {
+        /// The file.
         path: PathBuf,
-        /// Poses, or broken lines.
+        /// Its lines, or broken ones.
         what: &'static str,
         /// How many are held.
         limit: usize,
+    },
+    /// A fix that no reader would take back.
+    #[error("a fix cannot be recorded")]
+    Fix {
+        /// What is wrong with it.
+        source: FrameFault,
     },
     /// A frame that no reader would take back.
     #[error("frame {seq} of camera {camera} cannot be recorded")]
@@ -61,11 +67,11 @@ pub enum SessionError {
     },
 }
 
-/// One line of the recording gave no frame (or no pose); the lines behind it are unharmed.
+/// One line of the recording gave no frame (or no pose, or no fix); the lines behind it are unharmed.
 #[derive(Debug, thiserror::Error)]
 #[error("{file} line {line}")]
 pub struct FrameError {
-    /// index.jsonl or poses.jsonl.
+    /// index.jsonl, poses.jsonl or gnss.jsonl.
     pub file: &'static str,
     /// Number of the line, from 1.
     pub line: u64,
@@ -130,8 +136,10 @@ impl FrameError {
     /// The counter this belongs to.
     #[must_use]
     pub fn reason(&self) -> Reason {
-        if self.file == POSES {
-            return Reason::BadPose;
+        match self.file {
+            POSES => return Reason::BadPose,
+            FIXES => return Reason::BadFix,
+            _ => {}
         }
         match &self.fault {
             FrameFault::LineTooLong { .. } | FrameFault::Line { .. } | FrameFault::Value { .. } => Reason::BadIndexLine,

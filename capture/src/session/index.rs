@@ -2,6 +2,7 @@ use demeter_frame::{CameraId, PixelFormat, Pose};
 use serde::{Deserialize, Serialize};
 
 use super::FrameFault;
+use crate::Fix;
 
 /// One line of index.jsonl: a frame and where its bytes are.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -66,6 +67,14 @@ impl PoseLine {
             });
         }
         Ok(self)
+    }
+}
+
+/// A line of gnss.jsonl: a place on Earth.
+pub(super) fn checked_fix(fix: Fix) -> Result<Fix, FrameFault> {
+    match fix.wrong() {
+        Some(key) => Err(FrameFault::Value { key, expected: "what a place on Earth has", found: format!("{fix:?}") }),
+        None => Ok(fix),
     }
 }
 

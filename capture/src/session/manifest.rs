@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 /// The version of the session format this program writes, and the newest it reads.
 pub const SCHEMA_VERSION: u32 = 1;
 
+/// The farthest a camera is from the antenna on its rig, metres each way: a guess beyond the widest boom's half.
+pub const LONGEST_ARM: f64 = 20.0;
+
 /// session.toml: what was recorded, with which cameras, along which rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -16,6 +19,9 @@ pub struct Manifest {
     pub session_id: String,
     /// The crop: a species the program knows.
     pub species: String,
+    /// Where the cameras are from the antenna of the satellite receiver, metres: forwards along the drive, and to the left.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cameras_from_antenna_m: Option<[f64; 2]>,
     /// The rig's cameras, at least one.
     pub cameras: Vec<SessionCamera>,
     /// The rows driven along, in order.
@@ -134,7 +140,7 @@ impl Manifest {
             return Err(value("schema_version", "1", self.schema_version));
         }
         for (key, id) in [("rig_id", &self.rig_id), ("session_id", &self.session_id), ("species", &self.species)] {
-            is_id(key, id)?;
+            check_id(key, id)?;
         }
         if self.cameras.is_empty() {
             return Err(value("cameras", "at least one camera", "none"));
@@ -145,6 +151,9 @@ impl Manifest {
                 return Err(value(format!("cameras[{i}].id"), "a name of its own", &camera.id));
             }
         }
+        if let Some(arm) = self.cameras_from_antenna_m.filter(|arm| !arm.iter().all(|m| m.abs() <= LONGEST_ARM)) {
+            return Err(value("cameras_from_antenna_m", "at most 20 metres each way", format!("{arm:?}")));
+        }
         for (i, row) in self.rows.iter().enumerate() {
             row.check(&format!("rows[{i}]"))?;
         }
@@ -154,7 +163,7 @@ impl Manifest {
 
 impl SessionCamera {
     fn check(&self, key: &str) -> Result<(), ManifestError> {
-        is_id(&format!("{key}.id"), &self.id.0)?;
+        check_id(&format!("{key}.id"), &self.id.0)?;
         let intrinsics = self.intrinsics.validated();
         intrinsics.map_err(|source| ManifestError::Camera { key: key.to_owned(), source })?;
         if self.rig_from_camera.is_none() && self.height_above_ground_m.is_none() {
@@ -178,17 +187,19 @@ impl Row {
     }
 }
 
-/// Ids become file names and parts of URLs, so they hold nothing that means something there.
-fn is_id(key: &str, id: &str) -> Result<(), ManifestError> {
+/// What [`is_id`] takes, for messages.
+pub const ID: &str = "1 to 64 bytes of letters, digits, '-', '_' and '.', not first a '.'";
+
+/// Whether a session takes this for an id. Ids become file names and parts of URLs, so they hold nothing that means
+/// something there.
+#[must_use]
+pub fn is_id(id: &str) -> bool {
     let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
-    if id.is_empty() || id.len() > 64 || id.starts_with('.') || !id.chars().all(plain) {
-        return Err(value(
-            key,
-            "1 to 64 bytes of letters, digits, '-', '_' and '.', not first a '.'",
-            format!("{id:?}"),
-        ));
-    }
-    Ok(())
+    !id.is_empty() && id.len() <= 64 && !id.starts_with('.') && id.chars().all(plain)
+}
+
+fn check_id(key: &str, id: &str) -> Result<(), ManifestError> {
+    if is_id(id) { Ok(()) } else { Err(value(key, ID, format!("{id:?}"))) }
 }
 
 /// Rows and plots are named by people, who use spaces and slashes.

@@ -4,6 +4,7 @@
 //! session.toml   Manifest: rig, cameras with calibration, rows, species
 //! index.jsonl    one IndexLine a frame, in the order of arrival
 //! poses.jsonl    optional: one PoseLine a frame; the ground is the world's plane z = 0
+//! gnss.jsonl     optional: one Fix a line, of the antenna
 //! frames/        the cameras' bytes, one file a frame
 //! ```
 //!
@@ -19,13 +20,14 @@ mod replay;
 
 pub use error::{FrameError, FrameFault, SessionError};
 pub use files::FileFault;
-pub use manifest::{Manifest, ManifestError, Row, SCHEMA_VERSION, SessionCamera};
+pub use manifest::{ID, LONGEST_ARM, Manifest, ManifestError, Row, SCHEMA_VERSION, SessionCamera, is_id};
 pub use recorder::Recorder;
 pub use replay::{Pace, Replay};
 
 const MANIFEST: &str = "session.toml";
 const INDEX: &str = "index.jsonl";
 const POSES: &str = "poses.jsonl";
+const FIXES: &str = "gnss.jsonl";
 const FRAMES: &str = "frames";
 
 /// The largest file taken for a frame, bytes: a raw frame of 10 megapixels, or any JPEG of [`MAX_PIXELS`](crate::MAX_PIXELS).

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use demeter_frame::{Frame, PixelFormat};
 use serde::Serialize;
 
-use super::index::{IndexLine, PoseLine};
+use super::index::{IndexLine, PoseLine, checked_fix};
 use super::lines::MAX_LINE;
-use super::{FRAMES, FileFault, FrameFault, INDEX, MANIFEST, MAX_FRAME_BYTES, Manifest, POSES, SessionError};
+use super::{FIXES, FRAMES, FileFault, FrameFault, INDEX, MANIFEST, MAX_FRAME_BYTES, Manifest, POSES, SessionError};
+use crate::Fix;
 
 /// Writes a recorded session.
 ///
@@ -19,6 +20,7 @@ pub struct Recorder {
     manifest: Manifest,
     index: Log,
     poses: Option<Log>,
+    fixes: Option<Log>,
 }
 
 impl Recorder {
@@ -32,14 +34,19 @@ impl Recorder {
             manifest.to_toml().map_err(|source| SessionError::Manifest { path: folder.join(MANIFEST), source })?;
         let io = |source| SessionError::Io { path: folder.to_owned(), source };
         fs::create_dir_all(folder).map_err(io)?;
-        for name in [MANIFEST, INDEX, POSES, FRAMES] {
+        for name in [MANIFEST, INDEX, POSES, FIXES, FRAMES] {
             if fs::symlink_metadata(folder.join(name)).is_ok() {
                 return Err(SessionError::Exists { path: folder.to_owned() });
             }
         }
         fs::create_dir(folder.join(FRAMES)).map_err(io)?;
-        let recorder =
-            Self { index: Log::create(folder.join(INDEX))?, poses: None, folder: folder.to_owned(), manifest };
+        let recorder = Self {
+            index: Log::create(folder.join(INDEX))?,
+            poses: None,
+            fixes: None,
+            folder: folder.to_owned(),
+            manifest,
+        };
         // session.toml comes last and whole: a folder that has it is a session.
         let unnamed = folder.join("session.toml.new");
         fs::write(&unnamed, text).and_then(|()| File::open(&unnamed)?.sync_all()).map_err(io)?;
@@ -64,13 +71,20 @@ impl Recorder {
         let path = self.folder.join(&index.file);
         write_new(&path, &frame.bytes).map_err(|source| SessionError::Io { path, source })?;
         if let Some(pose) = pose {
-            let poses = match self.poses.take() {
-                Some(poses) => poses,
-                None => Log::create(self.folder.join(POSES))?,
-            };
-            self.poses.insert(poses).append(&pose)?;
+            Log::of(&mut self.poses, &self.folder, POSES)?.append(&pose)?;
         }
         self.index.append(&line)
+    }
+
+    /// Appends a fix of the rig's receiver.
+    ///
+    /// # Errors
+    /// [`SessionError::Io`] when the disk refuses; [`SessionError::Fix`] for one that no reader would take back.
+    pub fn write_fix(&mut self, fix: &Fix) -> Result<(), SessionError> {
+        let ours = fix.boot_id.as_ref() == Some(&self.manifest.session_id);
+        let fix = Fix { boot_id: fix.boot_id.clone().filter(|_| !ours), ..fix.clone() };
+        let line = checked_fix(fix).and_then(|fix| to_line(&fix)).map_err(|source| SessionError::Fix { source })?;
+        Log::of(&mut self.fixes, &self.folder, FIXES)?.append(&line)
     }
 
     /// Makes everything durable.
@@ -79,7 +93,9 @@ impl Recorder {
     /// [`SessionError::Io`] when the disk refuses: the recording may then be incomplete.
     pub fn finish(self) -> Result<(), SessionError> {
         self.index.sync()?;
-        self.poses.as_ref().map_or(Ok(()), Log::sync)?;
+        for log in [&self.poses, &self.fixes] {
+            log.as_ref().map_or(Ok(()), Log::sync)?;
+        }
         for folder in [self.folder.join(FRAMES), self.folder.clone()] {
             File::open(&folder)
                 .and_then(|opened| opened.sync_all())
@@ -145,6 +161,15 @@ impl Log {
             Ok(file) => Ok(Self { path, file, len: 0 }),
             Err(source) => Err(SessionError::Io { path, source }),
         }
+    }
+
+    /// The log in its place, made where there is none yet.
+    fn of<'a>(place: &'a mut Option<Self>, folder: &Path, name: &str) -> Result<&'a mut Self, SessionError> {
+        let log = match place.take() {
+            Some(log) => log,
+            None => Self::create(folder.join(name))?,
+        };
+        Ok(place.insert(log))
     }
 
     /// Appends all of `piece`, or takes back what was written of it.

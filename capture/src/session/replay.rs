@@ -4,22 +4,24 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use demeter_frame::{CameraId, Frame, Pose, Stamp};
+use serde::de::DeserializeOwned;
 
-use super::index::{IndexLine, PoseLine};
+use super::index::{IndexLine, PoseLine, checked_fix};
 use super::lines::{self, Lines};
 use super::{
-    FileFault, FrameError, FrameFault, INDEX, MANIFEST, MAX_FRAME_BYTES, Manifest, POSES, SessionError, files,
+    FIXES, FileFault, FrameError, FrameFault, INDEX, MANIFEST, MAX_FRAME_BYTES, Manifest, POSES, SessionError, files,
 };
-use crate::{Source, SourceError};
+use crate::{Fix, Positions, Source, SourceError};
 
 /// Bytes of a session.toml: thousands of rows fit.
 const MAX_MANIFEST_BYTES: u64 = 1 << 20;
 
-/// Poses held in memory: ten hours of two cameras at 15 frames a second, about 150 MB.
-const MAX_POSES: usize = 1 << 20;
+/// Poses, or fixes, held in memory: ten hours of two cameras at 15 frames a second, about 150 MB.
+const MAX_HELD: usize = 1 << 20;
 
-/// Broken lines of poses.jsonl told one by one; each may hold a line, 4 MB in all. More, and the file is something else.
-const MAX_POSE_FAULTS: usize = 1000;
+/// Broken lines of poses.jsonl and gnss.jsonl told one by one; each may hold a line, 4 MB in all. More, and the file is
+/// something else.
+const MAX_FAULTS: usize = 1000;
 
 /// The longest wait between two frames at [`Pace::Real`]: a recorded pause, or a forged stamp, is cut to it.
 const MAX_WAIT: Duration = Duration::from_secs(1);
@@ -42,7 +44,9 @@ pub struct Replay {
     index: Lines,
     frames_left: u64,
     poses: BTreeMap<(CameraId, u64), Pose>,
-    pose_faults: VecDeque<FrameError>,
+    positions: Positions,
+    /// Of the files beside the index.
+    faults: VecDeque<FrameError>,
     pace: Pace,
     before: Option<(Instant, u64)>,
 }
@@ -67,14 +71,21 @@ impl Replay {
             root: root.clone(),
             manifest,
             poses: BTreeMap::new(),
-            pose_faults: VecDeque::new(),
+            positions: Positions::default(),
+            faults: VecDeque::new(),
             pace,
             before: None,
         };
-        match files::open(&root, POSES) {
-            Ok(file) => replay.read_poses(Lines::new(POSES, file))?,
-            Err(FileFault::Missing { .. }) => {}
-            Err(source) => return Err(fault(POSES)(source)),
+        let open = |file| match files::open(&root, file) {
+            Ok(opened) => Ok(Some(Lines::new(file, opened))),
+            Err(FileFault::Missing { .. }) => Ok(None),
+            Err(source) => Err(fault(file)(source)),
+        };
+        if let Some(lines) = open(POSES)? {
+            replay.read(POSES, lines, Self::pose)?;
+        }
+        if let Some(lines) = open(FIXES)? {
+            replay.read(FIXES, lines, Self::fix)?;
         }
         Ok(replay)
     }
@@ -85,29 +96,52 @@ impl Replay {
         &self.manifest
     }
 
-    fn read_poses(&mut self, mut lines: Lines) -> Result<(), SessionError> {
-        let path = || self.root.join(POSES);
-        while let Some(line) = lines.next::<PoseLine>().map_err(|source| SessionError::Io { path: path(), source })? {
-            if self.poses.len() >= MAX_POSES {
-                return Err(SessionError::Poses { path: path(), what: "poses", limit: MAX_POSES });
-            }
-            if self.pose_faults.len() >= MAX_POSE_FAULTS {
-                return Err(SessionError::Poses { path: path(), what: "broken lines", limit: MAX_POSE_FAULTS });
-            }
-            let known = line.and_then(PoseLine::checked).and_then(|line| {
-                let PoseLine { camera, seq, world_from_camera } = line;
-                known_camera(&self.manifest, &camera)?;
-                if self.poses.contains_key(&(camera.clone(), seq)) {
-                    return Err(FrameFault::Value { key: "seq", expected: "one pose a frame", found: seq.to_string() });
-                }
-                self.poses.insert((camera, seq), world_from_camera);
-                Ok(())
-            });
-            if let Err(fault) = known {
-                self.pose_faults.push_back(lines.fault(fault));
+    /// Where the antenna was, as far as gnss.jsonl tells.
+    #[must_use]
+    pub fn positions(&self) -> Positions {
+        self.positions.clone()
+    }
+
+    /// Reads a file beside the index, line by line; a broken one is told later.
+    fn read<T: DeserializeOwned>(
+        &mut self,
+        file: &'static str,
+        mut lines: Lines,
+        take: impl Fn(&mut Self, T) -> Result<(), FrameFault>,
+    ) -> Result<(), SessionError> {
+        let path = self.root.join(file);
+        let io = |source| SessionError::Io { path: path.clone(), source };
+        let mut held = 0;
+        while let Some(line) = lines.next().map_err(io)? {
+            let too_many = |what, limit| Err(SessionError::TooMany { path: path.clone(), what, limit });
+            match line.and_then(|line| take(self, line)) {
+                Ok(()) if held >= MAX_HELD => return too_many("lines", MAX_HELD),
+                Ok(()) => held += 1,
+                Err(_) if self.faults.len() >= MAX_FAULTS => return too_many("broken lines", MAX_FAULTS),
+                Err(fault) => self.faults.push_back(lines.fault(fault)),
             }
         }
         Ok(())
+    }
+
+    fn pose(&mut self, line: PoseLine) -> Result<(), FrameFault> {
+        let PoseLine { camera, seq, world_from_camera } = line.checked()?;
+        known_camera(&self.manifest, &camera)?;
+        if self.poses.contains_key(&(camera.clone(), seq)) {
+            return Err(FrameFault::Value { key: "seq", expected: "one pose a frame", found: seq.to_string() });
+        }
+        self.poses.insert((camera, seq), world_from_camera);
+        Ok(())
+    }
+
+    fn fix(&mut self, fix: Fix) -> Result<(), FrameFault> {
+        let fix = checked_fix(fix)?;
+        let (boot_id, found) = (fix.boot_id.clone().unwrap_or_else(|| self.manifest.session_id.clone()), fix.t_mono_ns);
+        if self.positions.replay(fix, boot_id) {
+            return Ok(());
+        }
+        let expected = "no earlier than the line before";
+        Err(FrameFault::Value { key: "t_mono_ns", expected, found: found.to_string() })
     }
 
     fn frame(&self, line: IndexLine) -> Result<Frame, FrameFault> {
@@ -148,7 +182,7 @@ impl Replay {
 
 impl Source for Replay {
     fn next(&mut self) -> Result<Option<Frame>, SourceError> {
-        if let Some(fault) = self.pose_faults.pop_front() {
+        if let Some(fault) = self.faults.pop_front() {
             return Err(fault.into());
         }
         let lost = |source| SourceError::Lost { what: format!("{} in {}", INDEX, self.root.display()), source };
@@ -162,7 +196,7 @@ impl Source for Replay {
     }
 
     fn len_hint(&self) -> Option<u64> {
-        Some(self.frames_left + self.pose_faults.len() as u64)
+        Some(self.frames_left + self.faults.len() as u64)
     }
 }
 

@@ -32,7 +32,7 @@ impl Driver for Camera {
         for complaint in controls::set(&opened, &self.0.controls, self.0.mode.rate) {
             tracing::warn!("camera {}: {complaint}", self.0.id);
         }
-        Ok(Box::new(stream::Buffers::start(&opened, layout)?))
+        Ok(Box::new(stream::Buffers::start(opened, layout, self.0.clone())?))
     }
 }
 

@@ -5,10 +5,11 @@ use std::time::Duration;
 use v4l::device::Handle;
 use v4l::v4l_sys::{V4L2_BUF_FLAG_ERROR, V4L2_BUF_FLAG_TIMESTAMP_MASK, V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC};
 
+use super::controls;
 use super::ioctl::{self, Mapped};
-use crate::CameraFault;
 use crate::camera::driver::{Layout, Shot, Stream};
 use crate::camera::monotonic_ns;
+use crate::{CameraFault, CameraSettings, Controls};
 
 /// Buffers that the driver fills in turn: an eighth of a second at 30 frames a second.
 const BUFFERS: u32 = 4;
@@ -21,14 +22,17 @@ pub(super) struct Buffers {
     handle: Arc<Handle>,
     mapped: Vec<Mapped>,
     layout: Layout,
+    device: v4l::Device,
+    settings: CameraSettings,
 }
 
 impl Buffers {
-    pub(super) fn start(device: &v4l::Device, layout: Layout) -> Result<Self, CameraFault> {
+    pub(super) fn start(device: v4l::Device, layout: Layout, settings: CameraSettings) -> Result<Self, CameraFault> {
         let handle = device.handle();
         let count = ioctl::request_buffers(&handle, BUFFERS).map_err(CameraFault::refused("asking for buffers"))?;
         let mapped = (0..count).map(|index| Mapped::new(&handle, index)).collect::<io::Result<_>>();
-        let buffers = Self { mapped: mapped.map_err(CameraFault::refused("mapping buffers"))?, handle, layout };
+        let mapped = mapped.map_err(CameraFault::refused("mapping buffers"))?;
+        let buffers = Self { handle, mapped, layout, device, settings };
         for index in 0..count {
             ioctl::queue(&buffers.handle, index).map_err(CameraFault::refused("handing over a buffer"))?;
         }
@@ -44,6 +48,13 @@ impl Buffers {
 impl Stream for Buffers {
     fn layout(&self) -> Layout {
         self.layout
+    }
+
+    fn limit_exposure(&mut self, longest: f64) {
+        let exposure = Controls { longest_exposure: Some(longest), ..Controls::default() };
+        for complaint in controls::set(&self.device, &exposure, self.settings.mode.rate) {
+            tracing::debug!("camera {}: {complaint}", self.settings.id);
+        }
     }
 
     fn grab(&mut self, wait: Duration) -> Result<Option<Shot>, CameraFault> {

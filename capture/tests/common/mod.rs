@@ -66,6 +66,7 @@ pub(crate) fn manifest() -> Manifest {
         session_id: "session-1".into(),
         species: "soybean".into(),
         cameras: vec![camera("left"), camera("right")],
+        cameras_from_antenna_m: None,
         rows: vec![Row { row: "12".into(), plot: Some("Süd 3/4".into()), plant_spacing_m: Some(0.06) }],
     }
 }

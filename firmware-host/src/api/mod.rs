@@ -1,7 +1,8 @@
 //! The status API and the page (spec/appliance.md "Status API and page"): read-only, on loopback alone.
 //!
-//! The routes live in `plants` and `status`, the page's files in `page`; `guard` stands before all of them.
+//! The routes live in `cameras`, `plants`, `status` and `sync`, the page's files in `page`; `guard` stands before all of them.
 
+mod cameras;
 mod guard;
 mod page;
 mod plants;
@@ -21,9 +22,11 @@ use metrics_exporter_prometheus::{PrometheusHandle, PrometheusRecorder};
 use tokio::net::TcpListener;
 use tokio::sync::{Notify, watch};
 
+use crate::pipeline::Views;
 use crate::status::Status;
 use crate::store::{Reader, StoreError};
 use crate::sync::Attendant;
+use cameras::Previews;
 use reply::ApiError;
 pub use sync::SyncStatus;
 
@@ -40,6 +43,8 @@ struct Inner {
     /// One reader: SQLite's calls block, so they run on tokio's threads for blocking work, one at a time.
     reader: Mutex<Reader>,
     status: watch::Receiver<Status>,
+    views: Views,
+    previews: Previews,
     attendant: Attendant,
     recorder: Arc<PrometheusRecorder>,
     metrics: PrometheusHandle,
@@ -47,18 +52,20 @@ struct Inner {
 }
 
 impl Api {
-    /// An API over a store; `status` is what the daemon says about itself, `attendant` does the sync, `address` is where
-    /// it listens.
+    /// An API over a store; `status` is what the daemon says about itself, `views` is what its cameras see, `attendant`
+    /// does the sync, `address` is where it listens.
     #[must_use]
     pub fn new(
         reader: Reader,
         status: watch::Receiver<Status>,
+        views: Views,
         attendant: Attendant,
         recorder: Arc<PrometheusRecorder>,
         address: SocketAddr,
     ) -> Self {
         let (metrics, port) = (recorder.handle(), address.port());
-        Self { inner: Arc::new(Inner { reader: Mutex::new(reader), status, attendant, recorder, metrics, port }) }
+        let (reader, previews) = (Mutex::new(reader), Previews::default());
+        Self { inner: Arc::new(Inner { reader, status, views, previews, attendant, recorder, metrics, port }) }
     }
 
     /// Answers requests until `stop` is done.
@@ -89,6 +96,8 @@ impl Api {
     fn routes(self) -> Router {
         let v1 = Router::new()
             .route("/status", get(status::status))
+            .route("/cameras", get(cameras::list))
+            .route("/cameras/{id}/preview.jpg", get(cameras::preview))
             .route("/sync", get(sync::show))
             .route("/sync/run", post(sync::run))
             .route("/plants", get(plants::list))

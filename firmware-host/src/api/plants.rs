@@ -14,7 +14,7 @@ use crate::store::Page;
 /// Plants on a page when the request names no limit.
 const LIMIT: u32 = 50;
 
-type Id = Result<Path<String>, PathRejection>;
+pub(super) type Id = Result<Path<String>, PathRejection>;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -65,7 +65,7 @@ pub(super) async fn thumbnail(State(api): State<Api>, id: Id) -> Result<impl Int
     Ok(([(CONTENT_TYPE, "image/png")], png.ok_or_else(|| ApiError::not_found("no such picture"))?))
 }
 
-fn known(id: Id) -> Result<String, ApiError> {
+pub(super) fn known(id: Id) -> Result<String, ApiError> {
     id.map(|Path(id)| id).map_err(|error| ApiError::bad_request(error.body_text()))
 }
 

@@ -31,6 +31,11 @@ impl ApiError {
         Self { status: StatusCode::FORBIDDEN, kind: "forbidden", message: message.into() }
     }
 
+    pub(super) fn busy() -> Self {
+        let message = "another one is being made; ask again in a second".into();
+        Self { status: StatusCode::SERVICE_UNAVAILABLE, kind: "busy", message }
+    }
+
     /// Something of ours broke: the log has the reason, the client none of our paths.
     pub(super) fn internal(error: &dyn std::error::Error) -> Self {
         tracing::error!("request failed: {}", chain(error));

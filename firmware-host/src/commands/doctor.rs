@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use demeter_models::Runtime;
 use serde::Serialize;
 
-use crate::config::{Config, ModelsConfig};
-use crate::daemon::disk::{folder_of, free_bytes};
+use crate::config::{Config, ModelsConfig, PositionConfig};
+use crate::daemon::disk::{folder_of, space};
 use crate::error::{CommandError, Exit, chain};
 use crate::eye::Eye;
 use crate::files;
 use crate::output::Output;
 use crate::store::{Reader, StoreError};
+
+mod position;
 
 /// Free bytes below which the disk is said to be full: a guess at a day of plants with their pictures.
 const MIN_FREE: u64 = 1 << 30;
@@ -71,6 +73,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let config = Config::load(args.config.as_deref());
     let store = args.db.clone().or(config.as_ref().ok().map(|config| config.store.path.clone()));
     let models = config.as_ref().map_or_else(|_| ModelsConfig::default(), |config| config.models.clone());
+    let receiver = config.as_ref().map_or_else(|_| PositionConfig::default(), |config| config.position.clone());
     let config =
         config.map_err(|error| Trouble::new(&error, "correct the line, or remove it: every key has a default"));
     let mut checks = vec![Check::new("configuration", config.map(|config| format!("page on {}", config.api.listen)))];
@@ -85,6 +88,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     checks.push(Check::new("ONNX Runtime", library.map_err(|error| Trouble::new(&error, mend))));
     checks.extend(networks);
     checks.push(Check::new("species", check_species()));
+    checks.push(Check::new("position", position::check(&receiver)));
 
     if output.json {
         output.json(&serde_json::json!({"checks": checks}))?;
@@ -118,8 +122,9 @@ fn check_store(path: &Path) -> Result<String, Trouble> {
 fn check_disk(store: &Path) -> Result<String, Trouble> {
     let folder = folder_of(store);
     let name = folder.display();
-    let free = free_bytes(folder)
-        .map_err(|error| Trouble { found: format!("{name}: {error}"), mend: "make the folder".into() })?;
+    let free = space(folder)
+        .map_err(|error| Trouble { found: format!("{name}: {error}"), mend: "make the folder".into() })?
+        .free;
     let found = format!("{name}: {:.1} GB free", free as f64 / 1e9);
     if free < MIN_FREE { Err(Trouble { found, mend: "free at least 1 GiB".into() }) } else { Ok(found) }
 }

@@ -58,6 +58,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let (control, clock) = (Control::default(), SystemClock::new());
     let run =
         Run { manifest: &manifest, species: &species, store: &store, control: &control, clock: &clock, live: false };
+    control.show_positions(source.positions());
     let mut plants = Vec::new();
     let outcome = pipeline::run(&run, &mut source, &mut eye, |progress| match progress {
         Progress::Frame => bar.inc(1),

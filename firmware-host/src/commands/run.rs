@@ -53,7 +53,7 @@ pub fn run(args: &Args, _output: &Output) -> Result<Exit, CommandError> {
         let listen = daemon.config().api.listen;
         let listener = TcpListener::bind(listen).await.map_err(|error| refused(listen, &error))?;
         let address = listener.local_addr().map_err(|error| refused(listen, &error))?;
-        let api = Api::new(daemon.reader()?, daemon.status(), daemon.attendant(), recorder, address);
+        let api = Api::new(daemon.reader()?, daemon.status(), daemon.views(), daemon.attendant(), recorder, address);
         tracing::info!("store {}, page http://{address}", daemon.config().store.path.display());
         daemon.run(api, listener).await
     });

@@ -1,8 +1,8 @@
 //! `[[cameras]]`: the rig's cameras.
 
 use demeter_capture::{
-    Backend, CameraSettings, Controls, Manifest, Mode, Mount, Row, SCHEMA_VERSION, SessionCamera, longest_exposure,
-    sampling,
+    Backend, CameraSettings, Controls, ID, Manifest, Mode, Mount, Row, SCHEMA_VERSION, SessionCamera, Speed, is_id,
+    longest_exposure, sampling,
 };
 use demeter_frame::{CameraId, Intrinsics, PixelFormat};
 use serde::Deserialize;
@@ -112,6 +112,9 @@ impl CameraConfig {
             ("cameras.distance_m", "0.01 to 100 metres", self.distance_m, 0.01..=100.0),
             ("cameras.blur_px", "0.01 to 100 pixels", self.blur_px, 0.01..=100.0),
         ];
+        if !is_id(&self.id) {
+            return Err(("cameras.id", ID, format!("{:?}", self.id)));
+        }
         if !sides.contains(&self.width) || !sides.contains(&self.height) {
             let found = format!("{} x {}", self.width, self.height);
             return Err(("cameras.width", "1 to 16384 pixels a side", found));
@@ -120,21 +123,22 @@ impl CameraConfig {
         wrong.map_or(Ok(()), |(key, expected, found, _)| Err((key, expected, found.to_string())))
     }
 
-    /// What capture needs, for a rig that drives so fast (metres a second).
+    /// What capture needs, for a rig that drives so fast.
     #[must_use]
-    pub fn settings(&self, speed: f64) -> CameraSettings {
+    pub fn settings(&self, speed: Speed) -> CameraSettings {
         let sampling = sampling(self.distance_m, self.intrinsics().fx);
+        let (longest_exposure, smear) = match speed {
+            Speed::Given(speed) => ((speed != 0.0).then(|| longest_exposure(speed, sampling, self.blur_px)), None),
+            Speed::Measured { .. } => (None, Some(sampling * self.blur_px)),
+        };
         CameraSettings {
             id: CameraId(self.id.clone()),
             device: self.device.clone(),
             backend: self.backend,
             mode: Mode { format: self.format, width: self.width, height: self.height, rate: self.rate },
-            controls: Controls {
-                longest_exposure: (speed != 0.0).then(|| longest_exposure(speed, sampling, self.blur_px)),
-                gain: self.gain,
-                white_balance: self.white_balance_k,
-            },
+            controls: Controls { longest_exposure, gain: self.gain, white_balance: self.white_balance_k },
             mount: Some(Mount { height: self.height_m, pitch: self.tilt_deg.to_radians(), speed }),
+            smear,
         }
     }
 
@@ -150,6 +154,8 @@ pub struct Sown<'a> {
     pub species: &'a str,
     /// Distance from plant to plant, metres, where it is known.
     pub spacing: Option<f64>,
+    /// Where the cameras are from the antenna, of a rig with a receiver ([`Manifest::cameras_from_antenna_m`]).
+    pub arm: Option<[f64; 2]>,
 }
 
 /// The session of these cameras, before its first frame.
@@ -166,6 +172,7 @@ pub fn manifest(cameras: &[CameraConfig], sown: Sown<'_>, rig_id: &str, session_
         rig_id: rig_id.into(),
         session_id: session_id.into(),
         species: sown.species.into(),
+        cameras_from_antenna_m: sown.arm,
         cameras: cameras.iter().map(camera).collect(),
         rows: vec![Row { row: "1".into(), plot: None, plant_spacing_m: sown.spacing }],
     }

@@ -1,17 +1,18 @@
 //! The line from frames to plants: the configured source, run in threads of its own.
 
+use std::io;
 use std::num::NonZeroUsize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
-use demeter_capture::{Cameras, Manifest, Pace, Replay, Source};
+use demeter_capture::{Cameras, Manifest, Pace, Receiver, Replay, Source, Speed};
 use demeter_frame::Intrinsics;
 use demeter_recon::world::Row;
 
 use crate::clock::{Clock, SystemClock};
 use crate::config::camera::{self, CameraConfig, Sown};
-use crate::config::{ModelsConfig, SourceConfig};
+use crate::config::{ModelsConfig, PositionConfig, SourceConfig};
 use crate::error::CommandError;
 use crate::eye::Eye;
 use crate::files;
@@ -34,6 +35,7 @@ pub(super) struct Line {
     /// The rig's cameras.
     pub(super) cameras: Vec<CameraConfig>,
     pub(super) models: ModelsConfig,
+    pub(super) position: PositionConfig,
     pub(super) store: Arc<Store>,
     pub(super) clock: Arc<SystemClock>,
     /// The box's name.
@@ -70,14 +72,23 @@ impl Line {
     }
 
     fn run(&self, control: &Control) -> Result<Activity, End> {
+        let failed = |error: io::Error| CommandError::failed("position", &error);
+        let live = matches!(self.source, SourceConfig::Cameras { .. });
+        // Read until the line ends. A recording brings its own positions, made-up plants have none.
+        let receiver = self.position.receiver().filter(|_| live).map(Receiver::open).transpose().map_err(failed)?;
+        if let Some(receiver) = &receiver {
+            control.show_positions(receiver.positions());
+        }
         let (mut source, manifest) = match &self.source {
-            SourceConfig::Replay { session } => replay(session)?,
+            SourceConfig::Replay { session } => replay(session, control)?,
             SourceConfig::Synthetic { species, plants, seed } => self.synthetic(species, *plants, *seed)?,
             SourceConfig::Cameras { species, speed_m_per_s, spacing_m } => {
-                self.live(Sown { species, spacing: *spacing_m }, *speed_m_per_s, control)?
+                let sown = Sown { species, spacing: *spacing_m, arm: self.position.arm() };
+                // The configuration was refused where nobody tells the speed.
+                let speed = self.position.speed(*speed_m_per_s).unwrap_or(Speed::Given(0.0));
+                self.live(sown, speed, control)?
             }
         };
-        let live = matches!(self.source, SourceConfig::Cameras { .. });
         let species = files::species(&manifest.species)?;
         let loading = control.looker.work();
         // One thread for the network: the other core decodes and fits.
@@ -102,9 +113,15 @@ impl Line {
         format!("{}-{boot}-{}", self.rig, self.clock.now().mono_ns / 1_000_000)
     }
 
-    fn live(&self, sown: Sown<'_>, speed: f64, control: &Control) -> Result<(Box<dyn Source>, Manifest), CommandError> {
+    fn live(
+        &self,
+        sown: Sown<'_>,
+        speed: Speed,
+        control: &Control,
+    ) -> Result<(Box<dyn Source>, Manifest), CommandError> {
         let settings: Vec<_> = self.cameras.iter().map(|camera| camera.settings(speed)).collect();
-        let cameras = Cameras::open(&settings).map_err(|error| CommandError::failed("camera", &error))?;
+        let cameras =
+            Cameras::open(&settings, &control.positions()).map_err(|error| CommandError::failed("camera", &error))?;
         control.show_cameras(cameras.health());
         Ok((Box::new(cameras), camera::manifest(&self.cameras, sown, &self.rig, &self.session_id())))
     }
@@ -127,8 +144,9 @@ fn bug(error: &PipelineError) -> End {
     End::Bug(CommandError::failed("bug", error))
 }
 
-fn replay(session: &Path) -> Result<(Box<dyn Source>, Manifest), CommandError> {
+fn replay(session: &Path, control: &Control) -> Result<(Box<dyn Source>, Manifest), CommandError> {
     let replay = Replay::open(session, Pace::Real).map_err(|error| CommandError::failed("session", &error))?;
+    control.show_positions(replay.positions());
     let manifest = replay.manifest().clone();
     Ok((Box::new(replay), manifest))
 }

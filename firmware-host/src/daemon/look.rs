@@ -3,16 +3,17 @@
 use std::ops::ControlFlow::{self, Break, Continue};
 use std::time::Instant;
 
-use demeter_capture::{CameraHealth, CameraState};
+use demeter_capture::{CameraState, PositionHealth, PositionState};
 use sd_notify::NotifyState;
 use serde_json::json;
 
+use super::disk::Room;
 use super::event::Event;
 use super::watchdog::{self, STUCK};
 use super::{Daemon, Links, notify};
 use crate::clock::Clock;
 use crate::error::{CommandError, Exit};
-use crate::status::{Activity, Health, Reason, Stage, Status};
+use crate::status::{Activity, CameraStatus, Health, Reason, Stage, Status};
 
 /// Ticks between two looks at everything: one second.
 const LOOK_EVERY: u32 = 4;
@@ -46,12 +47,14 @@ impl Daemon {
         let heat = self.thermal.update(now);
         let waiting = self.line.as_ref().is_some_and(|control| control.is_full());
         let disk = self.disk.update(waiting);
-        let (mut stages, mut cameras, mut frames_dropped) = (Vec::new(), Vec::new(), 0);
+        self.tend_reserve(&disk, waiting);
+        let (mut stages, mut cameras, mut position, mut frames_dropped) = (Vec::new(), Vec::new(), None, 0);
         if let Some(control) = &self.line {
             control.slow_down(heat.slowness);
             control.storage_full(disk.full);
             stages = watchdog::stages(control, now);
             cameras = control.cameras();
+            position = control.position_health();
             frames_dropped = control.dropped();
         }
         let before = self.status.borrow().clone();
@@ -60,7 +63,7 @@ impl Daemon {
             self.note("load", json!({"heat": heat, "disk": disk}));
         }
         let time_trusted = self.clock.synchronised();
-        let status = Status { stages, cameras, frames_dropped, time_trusted, heat, disk, ..before };
+        let status = Status { stages, cameras, position, frames_dropped, time_trusted, heat, disk, ..before };
         let reasons = self.reasons(&status, self.store_beat.silent(now));
         let health = reasons.first().map_or(Health::Works, |reason| reason.health);
         if watchdog::alive(&status.stages, &self.store_beat, now) {
@@ -76,6 +79,18 @@ impl Daemon {
         }
     }
 
+    /// Gives the store's reserve back or takes it, without waiting for the disk.
+    fn tend_reserve(&self, disk: &Room, failed: bool) {
+        if let Some(hold) = self.disk.change(disk, failed) {
+            let reserve = self.disk.reserve();
+            let tend = move || match reserve.hold(hold) {
+                Ok(()) => tracing::info!("the store's reserve is {}", if hold { "held" } else { "given back" }),
+                Err(error) => tracing::warn!("the store's reserve: {error}"),
+            };
+            tokio::task::spawn_blocking(tend);
+        }
+    }
+
     /// What is not as it should be, worst first.
     fn reasons(&self, status: &Status, silent: bool) -> Vec<Reason> {
         let broken = |kind, message| Reason { health: Health::Broken, kind, message };
@@ -86,23 +101,27 @@ impl Daemon {
         };
         let silent = silent.then(|| broken("store", format!("the store has not answered for {} s", STUCK.as_secs())));
         let full = status.disk.full.then(|| {
-            let least = self.config.store.min_free_mib;
-            broken("storage_full", format!("the disk is full: plants wait until {} MiB are free", 2 * least))
+            let enough = status.disk.enough_bytes >> 20;
+            broken("storage_full", format!("the disk is full: plants wait until {enough} MiB are free"))
         });
         let stuck = |stage: &Stage| {
             let seconds = stage.busy_seconds.unwrap_or_default();
             broken("stuck", format!("the {} has been at one item for {seconds:.0} s", stage.name))
         };
         let stuck = status.stages.iter().filter(|stage| stage.stuck).map(stuck);
-        let all_lost = status.cameras.iter().all(|camera| camera.state == CameraState::Lost);
-        let lost = |camera: &CameraHealth| {
-            let why = camera.last_error.as_deref().unwrap_or("no frames");
-            let message = format!("camera {} gives no frames: {why}", camera.id);
+        let is_lost = |camera: &&CameraStatus| camera.health.state == CameraState::Lost;
+        let all_lost = status.cameras.iter().all(|camera| is_lost(&camera));
+        let lost = |CameraStatus { health, .. }: &CameraStatus| {
+            let why = health.last_error.as_deref().unwrap_or("no frames");
+            let message = format!("camera {} gives no frames: {why}", health.id);
             if all_lost { broken("camera", message) } else { degraded("camera", message) }
         };
-        let lost = status.cameras.iter().filter(|camera| camera.state == CameraState::Lost).map(lost);
-        let lenses = self.line.as_ref().map_or_else(Vec::new, |control| control.bad_lenses());
-        let lenses = lenses.into_iter().map(|(camera, lens)| degraded("lens", format!("camera {camera}: {lens}")));
+        let lost = status.cameras.iter().filter(is_lost).map(lost);
+        let lens = |CameraStatus { health, lens }: &CameraStatus| {
+            lens.as_ref().map(|lens| degraded("lens", format!("camera {}: {lens}", health.id)))
+        };
+        let lenses = status.cameras.iter().filter_map(lens);
+        let position = status.position.as_ref().and_then(no_position).map(|why| degraded("position", why));
         let hot = (status.heat.slowness > 1).then(|| {
             let (celsius, part) = (status.heat.celsius.unwrap_or_default(), status.heat.slowness);
             degraded("hot", format!("the box is hot ({celsius:.0} °C) and works 1 second in {part}"))
@@ -116,9 +135,20 @@ impl Daemon {
             .chain(stuck)
             .chain(lost)
             .chain(lenses)
+            .chain(position)
             .chain(hot)
             .chain(refused)
             .chain(dark)
             .collect()
+    }
+}
+
+/// Why plants have no place on Earth just now; a receiver that was only just opened is given time.
+fn no_position(health: &PositionHealth) -> Option<String> {
+    let receiver = &health.receiver;
+    match (health.state, &health.last_error) {
+        (PositionState::Lost, Some(why)) => Some(format!("{receiver}: {why}")),
+        (PositionState::NoFix | PositionState::Lost, _) => Some(format!("{receiver}: no fix")),
+        (PositionState::Starting | PositionState::Fix, _) => None,
     }
 }

@@ -34,7 +34,7 @@ use crate::api::Api;
 use crate::clock::{Clock, SystemClock};
 use crate::config::Config;
 use crate::error::{CommandError, Exit, chain};
-use crate::pipeline::Control;
+use crate::pipeline::{Control, Views};
 use crate::status::{Activity, Status};
 use crate::store::{Reader, Store, StoreError};
 use crate::sync::{self, Attendant};
@@ -65,6 +65,8 @@ pub struct Daemon {
     clock: Arc<SystemClock>,
     /// The line that runs; none before its start and after its end.
     line: Option<Arc<Control>>,
+    /// What the cameras of the last line saw.
+    views: Views,
     thermal: Thermal,
     disk: Disk,
     lamp: Lamp,
@@ -99,6 +101,12 @@ impl Daemon {
     pub fn open(load: Load) -> Result<Self, CommandError> {
         let config = load()?;
         let path = &config.store.path;
+        let mut disk = Disk::new(path, config.store.min_free_bytes());
+        // A store on a full disk cannot even be opened without its reserve.
+        let room = disk.update(false);
+        if disk.change(&room, false) == Some(false) {
+            disk.reserve().hold(false).unwrap_or_else(|error| tracing::warn!("the store's reserve: {error}"));
+        }
         let store = Arc::new(Store::open(path)?);
         let clock = Arc::new(SystemClock::new());
         let (rig, named) = Rig::identify(Path::new("/"), &folder_of(path).join("rig.json"))?;
@@ -108,7 +116,7 @@ impl Daemon {
         }
         Ok(Self {
             thermal: Thermal::new(config.thermal.clone()),
-            disk: Disk::new(path, config.store.min_free_bytes()),
+            disk,
             lamp: Lamp::new(&config.lamp),
             attendant: Attendant::new(&config.sync),
             load,
@@ -116,6 +124,7 @@ impl Daemon {
             store,
             clock,
             line: None,
+            views: Views::default(),
             store_beat: StoreBeat::new(Instant::now()),
             refused: None,
             dark: None,
@@ -136,6 +145,12 @@ impl Daemon {
     #[must_use]
     pub fn status(&self) -> watch::Receiver<Status> {
         self.status.subscribe()
+    }
+
+    /// What the cameras see, now and later.
+    #[must_use]
+    pub fn views(&self) -> Views {
+        self.views.clone()
     }
 
     /// Whom to ask for a sync.
@@ -216,11 +231,13 @@ impl Daemon {
             source,
             cameras: self.config.cameras.clone(),
             models: self.config.models.clone(),
+            position: self.config.position.clone(),
             store: self.store.clone(),
             clock: self.clock.clone(),
             rig: self.status.borrow().rig.clone(),
         };
-        let (control, news) = (Arc::new(Control::default()), links.news.clone());
+        self.views.clear();
+        let (control, news) = (Arc::new(Control::showing(self.views.clone())), links.news.clone());
         self.set_activity(Activity::Working);
         line.start(control.clone(), move |end| news.blocking_send(Event::LineEnded(end)).unwrap_or_default());
         self.line = Some(control);
@@ -279,7 +296,9 @@ impl Daemon {
         self.attendant.configure(&config.sync);
         self.lamp.dark().unwrap_or_else(|error| tracing::warn!("{error}"));
         self.lamp = Lamp::new(&config.lamp);
-        let line = |config: &Config| (config.source.clone(), config.models.clone(), config.cameras.clone());
+        let line = |config: &Config| {
+            (config.source.clone(), config.models.clone(), config.cameras.clone(), config.position.clone())
+        };
         let other_line = line(&config) != line(&self.config);
         self.config = config;
         tracing::info!("the configuration was read again");

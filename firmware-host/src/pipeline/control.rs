@@ -2,10 +2,12 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use demeter_capture::{CameraHealth, CamerasHealth, Lens};
-use demeter_frame::CameraId;
+use demeter_capture::{CamerasHealth, Lens, PositionHealth, Positions};
+use demeter_frame::{CameraId, Stamp};
 
 use super::beat::Beat;
+use super::views::Views;
+use crate::status::CameraStatus;
 
 /// How often a stage that rests or waits for room looks whether it may go on.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -27,12 +29,21 @@ pub struct Control {
     slowness: AtomicU32,
     full: AtomicBool,
     cameras: OnceLock<CamerasHealth>,
+    /// What the cameras see.
+    pub(super) views: Views,
+    positions: OnceLock<Positions>,
     bad_lenses: Mutex<Vec<(CameraId, Lens)>>,
     /// When everything must have ended; unset while the run goes on.
     deadline: OnceLock<Instant>,
 }
 
 impl Control {
+    /// Of a run whose frames are shown in `views`.
+    #[must_use]
+    pub fn showing(views: Views) -> Self {
+        Self { views, ..Self::default() }
+    }
+
     /// Ends the run: no new frames are read, and what is in hand may be finished until `grace` is over. What is not
     /// done by then is left out whole.
     pub fn stop(&self, grace: Duration) {
@@ -66,16 +77,30 @@ impl Control {
         self.cameras.get_or_init(|| health);
     }
 
-    /// How the cameras do; empty when frames come from elsewhere.
-    #[must_use]
-    pub fn cameras(&self) -> Vec<CameraHealth> {
-        self.cameras.get().map_or_else(Vec::new, CamerasHealth::read)
+    /// Lets the run, and whoever watches, see where the rig is.
+    pub fn show_positions(&self, positions: Positions) {
+        self.positions.get_or_init(|| positions);
     }
 
-    /// The lenses that are covered or dirty, as far as their pictures tell.
+    /// Where the rig was and is; nowhere when nobody tells.
     #[must_use]
-    pub fn bad_lenses(&self) -> Vec<(CameraId, Lens)> {
-        self.bad_lenses.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    pub fn positions(&self) -> Positions {
+        self.positions.get().cloned().unwrap_or_default()
+    }
+
+    /// How the satellite receiver does, where there is one.
+    #[must_use]
+    pub fn position_health(&self) -> Option<PositionHealth> {
+        self.positions.get()?.health()
+    }
+
+    /// How the cameras do.
+    #[must_use]
+    pub fn cameras(&self) -> Vec<CameraStatus> {
+        let cameras = self.cameras.get().map_or_else(|| self.views.cameras(), CamerasHealth::read);
+        let bad = self.bad_lenses.lock().unwrap_or_else(PoisonError::into_inner);
+        let lens = |id: &CameraId| bad.iter().find(|(camera, _)| camera == id).map(|(_, lens)| lens.to_string());
+        cameras.into_iter().map(|health| CameraStatus { lens: lens(&health.id), health }).collect()
     }
 
     pub(super) fn show_lenses(&self, bad: Vec<(CameraId, Lens)>) {
@@ -106,6 +131,11 @@ impl Control {
         let parts = self.slowness.load(Ordering::Relaxed).saturating_sub(1);
         let until = Instant::now() + worked.saturating_mul(parts).min(MAX_REST);
         wait_while(|| Instant::now() < until && !self.stopping());
+    }
+
+    /// Waits for the position at the time of a frame, where the fix after it is still to come.
+    pub(super) fn wait_for_position(&self, stamp: &Stamp) {
+        wait_while(|| self.positions.get().is_some_and(|positions| positions.may_come(stamp)) && !self.overdue());
     }
 
     /// Waits for room on the disk, at most until the run must have ended.

@@ -6,6 +6,7 @@ use demeter_recon::view::Closed;
 use serde_json::{Value, json};
 
 use super::looker::{BestView, Found, FrameKey};
+use super::place::{Beside, Place, place};
 use super::{Outcome, Progress, Run, Working};
 use crate::clock::wall_time;
 use crate::describe::{Encoding, describe};
@@ -78,6 +79,7 @@ impl Keeper<'_> {
     ) -> Result<(), StoreError> {
         let started = Instant::now();
         let id = format!("{}-{:04}", self.run.manifest.session_id, closed.number);
+        working.pause(|| self.run.control.wait_for_position(&closed.best.stamp));
         let mut plant = match self.new_plant(closed, id.clone()) {
             Ok(plant) => plant,
             Err(error) => {
@@ -138,6 +140,10 @@ impl Keeper<'_> {
         let mut provenance = self.provenance.clone();
         let (camera, seq) = &closed.best_frame;
         provenance["best_frame"] = json!([camera.0, seq]);
+        let placed = self.place(closed);
+        if let Some(placed) = &placed {
+            provenance["position"] = placed.provenance.clone();
+        }
         let (time, time_trusted) = match self.run.live {
             true => wall_time(self.run.clock, &best.stamp),
             // A recording does not say whether its clock was synchronised.
@@ -150,12 +156,21 @@ impl Keeper<'_> {
             time,
             time_trusted,
             position: Some(closed.position.extend(0.0)),
-            geographic: None,
+            geographic: placed.map(|placed| placed.geographic),
             models: self.models.clone(),
             provenance,
             observations: closed.frames.iter().map(|(camera, seq)| (camera.0.clone(), *seq)).collect(),
             thumbnail: picture::png(&beside).ok(),
         })
+    }
+
+    /// Where on Earth the plant stands, where the rig knew where it was when it saw the plant best.
+    fn place(&self, closed: &Closed<FrameKey, BestView>) -> Option<Place> {
+        let best = &closed.best;
+        let antenna = self.run.control.positions().at(&best.stamp)?;
+        let plant = closed.position - best.world_from_camera.translation.truncate();
+        let arm = self.run.manifest.cameras_from_antenna_m.unwrap_or_default();
+        Some(place(&antenna, &Beside { plant, forward: best.forward, arm }))
     }
 
     fn note(&self, kind: &str, detail: &Value) -> Result<(), StoreError> {

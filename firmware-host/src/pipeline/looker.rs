@@ -29,6 +29,8 @@ pub(super) struct BestView {
     pub world_from_camera: Pose,
     pub crop: Crop,
     pub stamp: Stamp,
+    /// The direction of the drive, in the world's plane.
+    pub forward: Option<DVec2>,
 }
 
 /// What leaves the stage, in the order of the frames.
@@ -107,7 +109,7 @@ impl<'a> Looker<'a> {
             tracing::warn!("frame {}: {degraded}", frame.seq);
         }
         let travelled = self.odometer.advance(&frame.camera, pose.translation.truncate());
-        let seen = observations(sight, frame, rgb, &camera.intrinsics, pose);
+        let seen = observations(sight, frame, rgb, &camera.intrinsics, pose, self.odometer.forward(&frame.camera));
         let (closed, misplaced) = self.tracker.frame(&key, travelled, seen);
         let mut found = vec![Found::Seen { milliseconds: started.elapsed().as_secs_f64() * 1e3 }];
         if !misplaced.is_empty() {
@@ -125,6 +127,7 @@ fn observations(
     rgb: &Rgb,
     camera: &demeter_frame::Intrinsics,
     world_from_camera: Pose,
+    forward: Option<DVec2>,
 ) -> Vec<Observation<BestView>> {
     let scale_source = sight.scale_source;
     let observation = |seen: crate::eye::PlantSight| {
@@ -141,6 +144,7 @@ fn observations(
                 world_from_camera,
                 crop: Crop::around(rgb, camera, seen.bounds, Crop::THUMBNAIL),
                 stamp: frame.stamp.clone(),
+                forward,
             },
         }
     };
@@ -150,14 +154,34 @@ fn observations(
 /// How far the rig has gone: the longest way of any of its cameras over the ground, metres.
 #[derive(Debug, Default)]
 struct Odometer {
-    cameras: BTreeMap<CameraId, (DVec2, f64)>,
+    cameras: BTreeMap<CameraId, Driven>,
 }
+
+#[derive(Debug)]
+struct Driven {
+    at: DVec2,
+    way: f64,
+    forward: Option<DVec2>,
+}
+
+/// A camera that moves less from one picture to the next stands, metres (a guess).
+const STANDS: f64 = 1e-3;
 
 impl Odometer {
     fn advance(&mut self, camera: &CameraId, at: DVec2) -> f64 {
-        let (last, way) = self.cameras.entry(camera.clone()).or_insert((at, 0.0));
-        *way += last.distance(at);
-        *last = at;
-        self.cameras.values().map(|(_, way)| *way).fold(0.0, f64::max)
+        let start = Driven { at, way: 0.0, forward: None };
+        let driven = self.cameras.entry(camera.clone()).or_insert(start);
+        let step = at - driven.at;
+        if step.length() >= STANDS {
+            driven.forward = step.try_normalize();
+        }
+        driven.way += step.length();
+        driven.at = at;
+        self.cameras.values().map(|driven| driven.way).fold(0.0, f64::max)
+    }
+
+    /// The direction in which the camera moved last, of unit length.
+    fn forward(&self, camera: &CameraId) -> Option<DVec2> {
+        self.cameras.get(camera)?.forward
     }
 }

@@ -14,7 +14,9 @@ mod beat;
 mod control;
 mod keep;
 mod looker;
+mod place;
 mod reader;
+mod views;
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::sync_channel;
@@ -26,6 +28,7 @@ use serde::Serialize;
 
 pub use beat::{Beat, Working};
 pub use control::Control;
+pub use views::Views;
 
 use crate::clock::Clock;
 use crate::eye::Eye;

@@ -42,7 +42,10 @@ pub(super) fn read(run: &Run<'_>, source: &mut dyn Source, to: &Sender<Arrival>)
                 continue;
             }
             Ok(Some(frame)) => match gate.admit(&frame) {
-                Ok(rgb) => Arrival::Frame(frame, rgb),
+                Ok(rgb) => {
+                    run.control.views.show(&frame);
+                    Arrival::Frame(frame, rgb)
+                }
                 Err(refusal) => Arrival::Refused {
                     frame: Some((frame.camera.0.clone(), frame.seq)),
                     reason: refusal.reason().name(),

@@ -19,8 +19,12 @@ const MIGRATIONS: [&str; 3] = [
     include_str!("migrations/0003_brapi.sql"),
 ];
 
+/// What the log beside the store grows to before it is brought into the file, bytes: a guess at twenty plants with their
+/// pictures.
+pub(super) const LOG_CAP: u64 = 2 << 20;
+
 /// Settings of every connection and what SQLite must answer (spec/reliability.md "Storage" 3).
-const PRAGMAS: [(&str, &str); 6] = [
+const PRAGMAS: [(&str, &str); 8] = [
     // An acknowledged record has been through fsync: NORMAL would lose the last ones in a power cut.
     ("synchronous", "2"),
     ("foreign_keys", "1"),
@@ -29,6 +33,9 @@ const PRAGMAS: [(&str, &str); 6] = [
     ("cell_size_check", "1"),
     // With mmap an I/O error is a signal that kills the program, without it an error that can be handled.
     ("mmap_size", "0"),
+    // [`LOG_CAP`] in pages of 4 KiB, and in bytes: a log that grew beyond it once is cut back.
+    ("wal_autocheckpoint", "512"),
+    ("journal_size_limit", "2097152"),
     // Settled at migration, checked here: readers never block the writer.
     ("journal_mode", "wal"),
 ];

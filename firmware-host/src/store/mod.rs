@@ -8,6 +8,7 @@ mod error;
 mod outbox;
 mod plant;
 mod read;
+mod reserve;
 mod whole;
 mod write;
 
@@ -16,5 +17,6 @@ pub use error::StoreError;
 pub use outbox::{Batch, Outbox, Waiting};
 pub use plant::{NewPlant, NewSession};
 pub use read::{Page, PlantRow, Reader, SessionRow, StoredRecord, Summary};
+pub use reserve::Reserve;
 pub use whole::WholePlant;
 pub use write::{Saved, Store};

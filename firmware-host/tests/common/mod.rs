@@ -31,7 +31,11 @@ pub(crate) struct Bench {
 pub(crate) const MODEL: &str = "ab54d286dfd1a2d5e0c0c7e4b9c1f3c2aabbccddeeff00112233445566778899";
 
 pub(crate) fn bench() -> Bench {
-    let folder = tempfile::tempdir().unwrap();
+    bench_in(tempfile::tempdir().unwrap())
+}
+
+/// The store in a folder of the caller's, opened again or made.
+pub(crate) fn bench_in(folder: tempfile::TempDir) -> Bench {
     let path = folder.path().join("demeter.sqlite");
     let store = Store::open(&path).unwrap();
     let species = demeter_recon::species::shipped("soybean").unwrap().unwrap();

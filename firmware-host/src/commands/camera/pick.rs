@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use demeter_capture::{Backend, devices};
 use demeter_frame::PixelFormat;
 
-use crate::config::{CameraConfig, Config};
+use crate::config::{CameraConfig, Config, PositionConfig};
 use crate::error::CommandError;
 
 /// Which cameras a command takes: those of the configuration, or one that is described by options.
@@ -43,6 +43,14 @@ pub(super) struct Pick {
 }
 
 impl Pick {
+    /// How the rig knows where it is, as the configuration says.
+    ///
+    /// # Errors
+    /// [`CommandError`] 2 for a configuration that is refused.
+    pub(super) fn position(&self) -> Result<PositionConfig, CommandError> {
+        Ok(Config::load(self.config.as_deref())?.position)
+    }
+
     /// The cameras, at least one.
     ///
     /// # Errors

@@ -2,7 +2,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use demeter_capture::{Cameras, Source, SourceError, decode};
+use demeter_capture::{Cameras, Positions, Source, SourceError, Speed, decode};
 use demeter_frame::{Frame, PixelFormat};
 use image::ImageFormat;
 
@@ -39,8 +39,9 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     };
     let mut cameras = args.pick.cameras()?;
     cameras.truncate(1);
-    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(0.0)).collect();
-    let mut source = Cameras::open(&settings).map_err(|error| CommandError::failed("camera", &error))?;
+    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(Speed::Given(0.0))).collect();
+    let mut source =
+        Cameras::open(&settings, &Positions::default()).map_err(|error| CommandError::failed("camera", &error))?;
     let frame = settled(&mut source)?;
     save(&frame, format, &args.output)?;
     if output.json {

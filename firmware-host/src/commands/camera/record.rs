@@ -4,7 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use demeter_capture::{CameraHealth, Cameras, LensWatch, Recorder, SessionError, Source, SourceError, decode};
+use demeter_capture::{
+    CameraHealth, Cameras, ID, LensWatch, Positions, Receiver, Recorder, SessionError, Source, SourceError, decode,
+    is_id,
+};
 use demeter_frame::{CameraId, Frame};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -22,9 +25,9 @@ pub(super) struct Args {
     #[command(flatten)]
     pick: Pick,
     /// How fast the rig drives along the row, metres a second: each frame's pose follows from it. Negative when the row
-    /// passes from left to right.
+    /// passes from left to right. Not needed where the configuration has a receiver in `[position]`, which measures it.
     #[arg(long, allow_negative_numbers = true, value_parser = speed)]
-    speed: f64,
+    speed: Option<f64>,
     /// The crop.
     #[arg(long, default_value = "soybean")]
     species: String,
@@ -32,7 +35,7 @@ pub(super) struct Args {
     #[arg(long, value_parser = spacing)]
     spacing: Option<f64>,
     /// Name of the rig.
-    #[arg(long, default_value = "rig")]
+    #[arg(long, default_value = "rig", value_parser = id)]
     rig: String,
     /// Stop after so many frames.
     #[arg(long)]
@@ -50,6 +53,8 @@ pub(super) struct Args {
 struct Summary {
     session: String,
     frames: u64,
+    /// Fixes of the satellite receiver.
+    fixes: u64,
     /// Frames that no reader would have taken back.
     unrecorded: u64,
     cameras: Vec<CameraHealth>,
@@ -61,22 +66,30 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     files::species(&args.species)?;
     let session = format!("rec-{}", jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ"));
     let failed = |error: &dyn std::error::Error| CommandError::failed("session", error);
-    let sown = Sown { species: &args.species, spacing: args.spacing };
+    let position = args.pick.position()?;
+    let speed = position.speed(args.speed).ok_or_else(|| {
+        CommandError::usage("usage", "expected --speed, or a receiver in the configuration's [position], found neither")
+    })?;
+    let sown = Sown { species: &args.species, spacing: args.spacing, arm: position.arm() };
     let manifest = manifest(&cameras, sown, &args.rig, &session);
     let mut recorder = Recorder::create(&args.output, manifest).map_err(|error| failed(&error))?;
     let stop = interrupted()?;
-    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(args.speed)).collect();
-    let mut source = Cameras::open(&settings).map_err(|error| CommandError::failed("camera", &error))?;
+    let receiver = position.receiver().map(Receiver::open).transpose();
+    let receiver = receiver.map_err(|error| CommandError::failed("position", &error))?;
+    let positions = receiver.as_ref().map(Receiver::positions).unwrap_or_default();
+    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(speed)).collect();
+    let mut source = Cameras::open(&settings, &positions).map_err(|error| CommandError::failed("camera", &error))?;
     let health = source.health();
     let bar = args.frames.map_or_else(ProgressBar::no_length, ProgressBar::new);
     let deadline = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
-    let (mut frames, mut unrecorded) = (0, 0);
+    let (mut frames, mut fixes, mut unrecorded) = (0, 0, 0);
     let mut lenses = BTreeMap::<CameraId, LensWatch>::new();
     let over = |frames| {
         let late = deadline.is_some_and(|deadline| Instant::now() >= deadline);
         late || args.frames.is_some_and(|most| frames >= most) || stop.load(Ordering::Relaxed)
     };
     while !over(frames) {
+        fixes += write_fixes(&mut recorder, &positions, fixes)?;
         match source.next() {
             Ok(Some(frame)) => match recorder.write(&frame) {
                 Ok(()) => {
@@ -97,13 +110,23 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         }
     }
     bar.finish_and_clear();
+    fixes += write_fixes(&mut recorder, &positions, fixes)?;
     let cameras = health.read();
     drop(source);
     recorder.finish().map_err(|error| failed(&error))?;
     let whole = |camera: &CameraHealth| camera.frames > 0 && camera.missed + camera.dropped + camera.damaged == 0;
     let done = unrecorded == 0 && cameras.iter().all(whole);
-    report(&Summary { session, frames, unrecorded, cameras }, output)?;
+    report(&Summary { session, frames, fixes, unrecorded, cameras }, output)?;
     Ok(if done { Exit::Done } else { Exit::Partial })
+}
+
+/// Writes the receiver's fixes after the first `seen`; how many.
+fn write_fixes(recorder: &mut Recorder, positions: &Positions, seen: u64) -> Result<u64, CommandError> {
+    let fixes = positions.since(seen);
+    for fix in &fixes {
+        recorder.write_fix(fix).map_err(|error| CommandError::failed("session", &error))?;
+    }
+    Ok(fixes.len() as u64)
 }
 
 /// Says when a lens gets dirty or is covered: an hour of such pictures would be found out too late.
@@ -121,7 +144,8 @@ fn report(summary: &Summary, output: &Output) -> Result<(), CommandError> {
     if output.json {
         return output.json(summary);
     }
-    let mut text = format!("{} frames in session {}\n", summary.frames, summary.session);
+    let Summary { session, frames, fixes, .. } = summary;
+    let mut text = format!("{frames} frames and {fixes} fixes in session {session}\n");
     for camera in &summary.cameras {
         let CameraHealth { id, frames, damaged, missed, dropped, reopened, .. } = camera;
         text += &format!(
@@ -156,6 +180,10 @@ fn interrupted() -> Result<Arc<AtomicBool>, CommandError> {
         });
     });
     Ok(stop)
+}
+
+fn id(text: &str) -> Result<String, String> {
+    if is_id(text) { Ok(text.to_owned()) } else { Err(format!("expected {ID}")) }
 }
 
 fn speed(text: &str) -> Result<f64, String> {
