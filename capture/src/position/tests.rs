@@ -202,7 +202,7 @@ fn a_pipe_without_a_writer_keeps_nobody_and_a_file_may_grow() {
     let lost = wait(&missing.positions(), |health| health.state == PositionState::Lost);
     assert!(lost.last_error.unwrap().contains("No such file"));
     let mut log = std::fs::File::create(&path).unwrap();
-    writeln!(log, "{}\r", framed("GNGGA,132820.20,,,,,0,00,99.9,,,,,,")).unwrap();
+    writeln!(log, "{}\r", framed("GNGGA,132820.10,,,,,0,00,99.9,,,,,,")).unwrap();
     wait(&missing.positions(), |health| health.state == PositionState::NoFix);
     writeln!(log, "{}\r", framed(GGA)).unwrap();
     wait(&missing.positions(), |health| health.state == PositionState::Fix);
