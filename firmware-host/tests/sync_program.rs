@@ -109,6 +109,10 @@ fn the_running_daemon_is_asked() {
     let failed = sync(&config, &["--now"]);
     assert_eq!(failed.status.code(), Some(3), "{failed:?}");
     assert!(String::from_utf8_lossy(&failed.stdout).contains("500"), "{failed:?}");
+    let answer = String::from_utf8(get(port, "/api/v1/sync")).unwrap();
+    let told: Value = serde_json::from_str(answer.split_once("\r\n\r\n").unwrap().1).unwrap();
+    let reasons = told["outbox"]["plants"].as_array().unwrap().iter().map(|plant| plant["reason"].as_str().unwrap());
+    assert!(reasons.clone().count() == 5 && reasons.clone().all(|why| why.contains("500")), "{answer}");
     depot.plan(|_| Fault::None);
     assert_eq!(sync(&config, &["--now"]).status.code(), Some(0));
     assert_eq!(judge(&bench, &depot.objects()).unwrap().len(), 5);
@@ -121,6 +125,23 @@ fn the_running_daemon_is_asked() {
     let locked = sync(&config, &["--now", "--json"]);
     assert_eq!(locked.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&locked.stdout).contains("sync_running"), "{locked:?}");
+}
+
+#[test]
+fn the_secret_may_be_a_credential_of_systemd() {
+    let bench = bench();
+    bench.fill(1..=2);
+    let depot = Depot::start(None, |_| Fault::None);
+    let config = configured(&bench, &format!("http://{}/base", depot.address), port());
+    let text = std::fs::read_to_string(&config).unwrap();
+    let without: Vec<_> = text.lines().filter(|line| !line.starts_with("secret_file")).collect();
+    std::fs::write(&config, without.join("\n")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("demeter-sync"), format!("{SECRET}\n")).unwrap();
+    let done = program(&config, &["sync", "--now"]).env("CREDENTIALS_DIRECTORY", folder.path()).output().unwrap();
+    assert_eq!(done.status.code(), Some(0), "{done:?}");
+    let requests = depot.requests();
+    assert!(!requests.is_empty() && requests.iter().all(|request| request.headers.contains(SECRET)));
 }
 
 #[test]
