@@ -6,6 +6,7 @@ use image::GrayImage;
 use image::imageops::{FilterType, resize};
 
 use super::patches;
+use crate::statistics::quantile;
 
 /// Levels of each colour channel that are told apart; finer ones would have too few pixels each.
 const LEVELS: usize = 16;
@@ -19,6 +20,16 @@ const MOST_NETWORK: f32 = 5.0;
 const MOST_COLOUR: f32 = 3.0;
 /// Share of a connected patch that the network must have seen as plant: else it only has a plant's colour.
 const MIN_SEEN: f64 = 0.3;
+/// The green of a picture's plants is this quantile of that of the pixels that the network is sure of, frames being among
+/// them; plants less green than the next are not told by it, and what is less than a share of it as green is grey (guesses).
+const PLANT_GREEN: f64 = 0.9;
+const LEAST_GREEN: f64 = 0.1;
+const GREY: f64 = 0.1;
+/// Grey patches of at most this share of the mask are glare and shade on leaves (a guess).
+const SHADE: f64 = 0.003;
+/// More grey than this share of the mask is a cabinet's frames, less may be brown leaves. On crops of plants up to 0.17 is
+/// grey, in cabinets mostly more.
+const FRAMES: f64 = 0.18;
 /// A frame is a column or row that the mask fills to more than this share, this near to the border in shares of the
 /// picture's width or height: windows and cabinets end straight there, plants do not (guesses).
 const FRAME_FILL: f64 = 0.5;
@@ -38,9 +49,35 @@ pub fn sharpened(picture: &Rgb, plant: &Mask) -> GrayImage {
         let said = (p / (1.0 - p)).ln().clamp(-MOST_NETWORK, MOST_NETWORK);
         to.0[0] = if said + odds.as_ref().map_or(0.0, |odds| odds.at(colour)) > 0.0 { 255 } else { 0 };
     }
+    drop_grey(&mut mask, picture, &plant);
     drop_frame(&mut mask);
     drop_unseen(&mut mask, &plant);
     mask
+}
+
+/// Empties what is grey beside a green plant, where that is much: dark leaves and dark frames differ in hue alone.
+fn drop_grey(mask: &mut GrayImage, picture: &Rgb, plant: &Mask) {
+    let sure = picture.pixels().zip(plant.pixels()).filter(|(_, p)| p.0[0] > SURE[1]);
+    let greens: Vec<f64> = sure.map(|(colour, _)| excess_green(colour)).collect();
+    let Some(of_plants) = quantile(&greens, PLANT_GREEN).filter(|green| *green > LEAST_GREEN) else { return };
+    let mut grey = mask.clone();
+    for (inside, colour) in grey.pixels_mut().zip(picture.pixels()) {
+        if excess_green(colour) >= GREY * of_plants {
+            inside.0[0] = 0;
+        }
+    }
+    let all = mask.iter().filter(|inside| **inside > 0).count() as f64;
+    let mut frames = patches(&grey);
+    frames.retain(|patch| patch.pixels.len() as f64 > SHADE * all);
+    if frames.iter().map(|patch| patch.pixels.len()).sum::<usize>() as f64 > FRAMES * all {
+        frames.iter().flat_map(|patch| &patch.pixels).for_each(|&p| mask.as_mut()[p] = 0);
+    }
+}
+
+/// How much greener than grey a colour is, in shares of its brightness: excess green of chromaticities, -1 to 2.
+fn excess_green(colour: &image::Rgb<u8>) -> f64 {
+    let [r, g, b] = colour.0.map(f64::from);
+    (2.0 * g - r - b) / (r + g + b).max(1.0)
 }
 
 /// Empties the straight dark edges of cabinets and windows: filled lines along the border with none further in.
@@ -179,6 +216,32 @@ mod tests {
         let mut full = GrayImage::from_pixel(128, 128, Luma([255]));
         drop_frame(&mut full);
         assert!(full.pixels().all(|v| v.0[0] > 0));
+    }
+
+    #[test]
+    fn dark_frames_go_and_dark_leaves_stay() {
+        let is_frame = |x: u32| x < 10;
+        let is_leaf = |x: u32| (60..80).contains(&x);
+        let picture = Rgb::from_fn(128, 128, |x, _| {
+            image::Rgb(if is_frame(x) {
+                [31, 30, 29]
+            } else if is_leaf(x) {
+                [28, 36, 16]
+            } else {
+                [250, 248, 235]
+            })
+        });
+        let seen = |x: u32| is_frame(x) || is_leaf(x);
+        let plant = Mask::from_fn(128, 128, |x, _| Luma([if seen(x) { 0.95 } else { 0.01 }]));
+        let mask = GrayImage::from_fn(128, 128, |x, _| Luma([if seen(x) { 255 } else { 0 }]));
+        let mut found = mask.clone();
+        drop_grey(&mut found, &picture, &plant);
+        assert!(found.enumerate_pixels().all(|(x, _, p)| (p.0[0] > 0) == is_leaf(x)));
+        // Without colour there is nothing to tell them by.
+        let grey = Rgb::from_fn(128, 128, |x, y| image::Rgb([picture.get_pixel(x, y).0[1]; 3]));
+        let mut kept = mask.clone();
+        drop_grey(&mut kept, &grey, &plant);
+        assert_eq!(kept, mask);
     }
 
     #[test]
