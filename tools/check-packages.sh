@@ -6,6 +6,8 @@ packages=()
 command -v systemd-analyze >/dev/null || packages+=(systemd)
 # The unit's reload and the tests of signals call it by its path; the shell's own is another.
 [ -x /bin/kill ] || packages+=(procps)
+# The test of full disks makes one.
+command -v mkfs.ext4 >/dev/null || packages+=(e2fsprogs)
 
 if [ ${#packages[@]} -gt 0 ]; then
     apt-get update -qq
