@@ -185,7 +185,9 @@ fn clock_is_trusted_by_the_daemon_when_systemd_says_that_it_is_synchronised() {
             command.env("PATH", path);
         });
         let asked = folder.path().join("asked");
-        let status = daemon.wait_for(|status| asked.exists() && (!trusted || status["time_trusted"] == true));
+        // The shell makes the file before it writes.
+        let is_asked = || std::fs::read_to_string(&asked).is_ok_and(|said| said.ends_with('\n'));
+        let status = daemon.wait_for(|status| is_asked() && (!trusted || status["time_trusted"] == true));
         assert_eq!(status["time_trusted"], trusted, "`{answer}`");
         assert_eq!(
             std::fs::read_to_string(asked).unwrap().lines().next(),

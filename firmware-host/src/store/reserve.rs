@@ -1,5 +1,6 @@
 use std::fs::{self, File};
 use std::io;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,7 +62,7 @@ impl Reserve {
     }
 
     fn take(&self) -> io::Result<()> {
-        let file = File::create(&self.path)?;
+        let file = File::options().write(true).create(true).truncate(true).mode(0o600).open(&self.path)?;
         // Not written, so it costs a card nothing, and a file system that packs zeros cannot do without the room.
         let taken = fallocate(&file, FallocateFlags::empty(), 0, Self::BYTES);
         taken.map_err(io::Error::from).or_else(|error| fs::remove_file(&self.path).and(Err(error)))
