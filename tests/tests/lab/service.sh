@@ -163,7 +163,7 @@ within 30 says '"state":"streaming"'
 
 begin the nightly timer fires, and plants leave
 install -d -o demeter -g demeter /var/lib/demeter/depot
-sed -i 's|^#url = .*|url = "file:///var/lib/demeter/depot"|; s|^#trust_clock = .*|trust_clock = true|' /etc/demeter/demeter.toml
+sed -i '/^\[sync\]/,/^#*url = /s|^#url = .*|url = "file:///var/lib/demeter/depot"|; s|^#trust_clock = .*|trust_clock = true|' /etc/demeter/demeter.toml
 systemctl reload demeter
 [ "$(systemctl show demeter-sync.timer --property=Persistent --value)" = yes ]
 mkdir -p /run/systemd/system/demeter-sync.timer.d
