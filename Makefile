@@ -48,12 +48,13 @@ bench: setup
 evaluation: build
 	tools/evaluation.sh
 
-# Both networks of models/, each from its own data: an hour each, data apart, and the same command resumes a stopped run.
+# The networks of models/, those of pictures from the same data: an hour each, data apart, and the same command resumes a stopped run.
 # The files that ship came from chains of shorter runs, which their manifests tell: docs/training.md.
 train: build
 	@tools/setup.sh training
 	test -d $(TRAINING)/images || tools/training-pictures.sh $(TRAINING) 12000
 	nice -n 3 /usr/bin/python3 models/training/train_organ2d.py --data $(TRAINING)/images --minutes 55
+	nice -n 3 /usr/bin/python3 models/training/train_relief2d.py --data $(TRAINING)/images --minutes 55
 	test -d $(TRAINING)/clouds || tools/training-clouds.sh $(TRAINING)/clouds
 	nice -n 3 /usr/bin/python3 models/training/train_organ3d.py --minutes 55 \
 		$(foreach set,helios demeter seedlings,--data $(TRAINING)/clouds/$(set))

@@ -7,7 +7,7 @@ program=$1 to=${2:-}
 put() { install -D -m "$1" "$2" "$to$3"; }
 
 put 755 "$program" /usr/bin/demeter
-for file in models/organ*; do put 644 "$file" "/usr/share/demeter/$file"; done
+for file in models/organ* models/relief*; do put 644 "$file" "/usr/share/demeter/$file"; done
 for library in .cache/onnxruntime/libonnxruntime*; do put 644 "$library" "/usr/lib/demeter/${library##*/}"; done
 for unit in demeter.service demeter-sync.service demeter-sync.timer; do
     put 644 "systemd/$unit" "/usr/lib/systemd/system/$unit"

@@ -95,6 +95,8 @@ impl Default for ApiConfig {
 
 /// Name of our network's manifest.
 pub const OURS: &str = "organ2d";
+/// Our network for depth.
+const RELIEF: &str = "relief2d";
 
 /// `[models]`: names of installed models (`demeter models list`) in place of what our network says (docs/models.md).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -110,7 +112,7 @@ pub struct ModelsConfig {
 
 impl Default for ModelsConfig {
     fn default() -> Self {
-        Self { mask: Vec::new(), organs: OURS.into(), depth: OURS.into() }
+        Self { mask: Vec::new(), organs: OURS.into(), depth: RELIEF.into() }
     }
 }
 

@@ -94,7 +94,7 @@ pub struct Sight {
     pub dropped: Vec<Dropped>,
     /// Where metres come from.
     pub scale_source: ScaleSource,
-    /// Other people's networks that failed on it.
+    /// Networks beside organ2d that failed on it.
     pub degraded: Vec<Degraded>,
 }
 
@@ -173,7 +173,7 @@ impl Eye {
         world_from_camera: Option<Pose>,
     ) -> Result<Sight, SightError> {
         let Scene { semantic, dist, log_depth, divided, metric, scale: enlargement, degraded } =
-            self.networks.scene(picture, maps, camera)?;
+            self.networks.scene(picture, maps, camera, world_from_camera.is_some())?;
         let (width, height) = semantic.dimensions();
         let view = View {
             semantic: &semantic,

@@ -1,5 +1,5 @@
-//! Networks together: ours says all of a picture, and other people's say part of it better where they are configured
-//! (docs/models.md).
+//! Networks together: organ2d says all of a picture; relief2d gives the depth of photos, and other people's say part of it
+//! better where they are configured (docs/models.md).
 
 use std::borrow::Cow;
 use std::num::NonZeroUsize;
@@ -19,7 +19,7 @@ use crate::error::chain;
 use crate::eye::EyeError;
 use crate::raster::nearest;
 
-/// The longest side of a picture given to other people's networks, pixels: the largest that one of them works at inside,
+/// The longest side of a picture given to any network but organ2d, pixels: the largest that one of them works at inside,
 /// and their answers grow with it.
 const LONG_SIDE: u32 = 1024;
 
@@ -103,11 +103,22 @@ impl Networks {
     }
 
     /// The scene of a picture and what ours says of it; what of the others fails is left out and said.
-    pub(crate) fn scene(&mut self, picture: &Rgb, maps: OrganMaps, camera: &Intrinsics) -> Result<Scene, ViewError> {
+    /// On a `known_ground`, whose plane corrects depth, organ2d's tells the plants of a row apart better than relief2d's
+    /// (docs/training.md).
+    pub(crate) fn scene(
+        &mut self,
+        picture: &Rgb,
+        maps: OrganMaps,
+        camera: &Intrinsics,
+        known_ground: bool,
+    ) -> Result<Scene, ViewError> {
         let semantic = maps.semantic();
         let (width, height) = semantic.dimensions();
         let mut degraded = Vec::new();
-        let working = if self.models().len() > 1 { bounded(picture) } else { Cow::Borrowed(picture) };
+        let idle = |network: &DepthNetwork| known_ground && matches!(network, DepthNetwork::Relief2d(_));
+        let depth = self.depth.as_mut().filter(|network| !idle(network));
+        let alone = self.mask.is_none() && self.organs.is_none() && depth.is_none();
+        let working = if alone { Cow::Borrowed(picture) } else { bounded(picture) };
         let mask = match &mut self.mask {
             Some(cutter) => {
                 let (raster, regions) = ours_divided(&maps, &semantic, camera)?;
@@ -116,7 +127,7 @@ impl Networks {
             None => None,
         };
         let organs = self.organs.as_mut().and_then(|network| kept("organs", network.run(&working), &mut degraded));
-        let depth = self.depth.as_mut().and_then(|network| kept("depth", network.run(&working), &mut degraded));
+        let depth = depth.and_then(|network| kept("depth", network.run(&working), &mut degraded));
 
         let mut scene = Scene {
             semantic,

@@ -4,7 +4,7 @@ use std::path::Path;
 use demeter_frame::{Depth, Rgb};
 use image::ImageBuffer;
 
-use crate::{DepthAnything, Layout, Meter, Model, ModelError, Runtime};
+use crate::{DepthAnything, Layout, Meter, Model, ModelError, Relief2d, Runtime};
 
 /// The least inverse depth told apart from none, as a share of the picture's largest: relative networks put the sky at
 /// 0, where the logarithm ends (a guess: 50 times the distance of what is nearest).
@@ -17,6 +17,8 @@ pub enum DepthMap {
     Metric(Depth),
     /// Inverse depth; its scale is unknown, and its shift is taken to be 0, at infinity.
     RelativeInverse(Depth),
+    /// Natural logarithm of depth, up to one additive constant.
+    RelativeLog(Depth),
 }
 
 impl DepthMap {
@@ -31,6 +33,7 @@ impl DepthMap {
                 let log = move |inverse: f32| -inverse.max(LEAST_INVERSE * most).ln();
                 (map, &move |inverse| if most > 0.0 { log(inverse) } else { f32::NAN })
             }
+            Self::RelativeLog(map) => (map, &|log| log),
         };
         let logs = map.iter().map(|&value| log(value)).collect();
         // As many values as pixels.
@@ -45,6 +48,8 @@ pub enum DepthNetwork {
     DepthAnything(DepthAnything),
     /// METER.
     Meter(Meter),
+    /// Ours.
+    Relief2d(Relief2d),
 }
 
 impl DepthNetwork {
@@ -53,10 +58,11 @@ impl DepthNetwork {
     /// # Errors
     /// Those of [`Model::open`], and [`ModelError::Ports`] when it is no depth network.
     pub fn open(runtime: &Runtime, path: &Path, threads: NonZeroUsize) -> Result<Self, ModelError> {
-        let layouts = [Layout::DepthAnything, Layout::DepthAnythingMetric, Layout::Meter];
+        let layouts = [Layout::DepthAnything, Layout::DepthAnythingMetric, Layout::Meter, Layout::Relief2d];
         let model = Model::open_as(runtime, path, threads, &layouts)?;
         Ok(match model.manifest().layout {
             Layout::Meter => Self::Meter(Meter::new(model)),
+            Layout::Relief2d => Self::Relief2d(Relief2d::new(model)?),
             _ => Self::DepthAnything(DepthAnything::new(model)?),
         })
     }
@@ -67,6 +73,7 @@ impl DepthNetwork {
         match self {
             Self::DepthAnything(network) => network.model(),
             Self::Meter(network) => network.model(),
+            Self::Relief2d(network) => network.model(),
         }
     }
 
@@ -78,6 +85,7 @@ impl DepthNetwork {
         match self {
             Self::DepthAnything(network) => network.run(image),
             Self::Meter(network) => network.run(image),
+            Self::Relief2d(network) => network.run(image),
         }
     }
 }

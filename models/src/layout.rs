@@ -12,6 +12,8 @@ pub enum Layout {
     Organ2d,
     /// Our network for organs in point clouds: see [`crate::Organ3d`].
     Organ3d,
+    /// Our network for depth: see [`crate::Relief2d`].
+    Relief2d,
     /// Depth Anything, relative: inverse depth up to scale and shift.
     DepthAnything,
     /// Depth Anything, metric: metres. The same ports as the relative one, so it must be said.

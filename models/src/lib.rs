@@ -2,9 +2,9 @@
 //!
 //! The only crate that names `ort`. A [`Runtime`] is the shared library, loaded once a process; a [`Model`] is a
 //! session whose file was verified against its [`Manifest`] before anything parsed it; [`Organ2d`] is our network for
-//! organs and depth, [`Organ3d`] that for organs in point clouds. A model file is refused when it is too large, altered, truncated, keeps weights in other files, or
-//! has inputs or outputs other than its manifest says; an output with a NaN or an infinity is an error, because ONNX
-//! Runtime passes them on silently.
+//! organs in pictures, [`Relief2d`] that for their depth, [`Organ3d`] that for organs in point clouds. A model file is
+//! refused when it is too large, altered, truncated, keeps weights in other files, or has inputs or outputs other than its
+//! manifest says; an output with a NaN or an infinity is an error, because ONNX Runtime passes them on silently.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -24,6 +24,7 @@ mod organ2d;
 mod organ3d;
 mod organs;
 mod pixels;
+mod relief2d;
 mod runtime;
 mod sam;
 mod search;
@@ -46,6 +47,7 @@ pub use model::{MAX_BYTES, Model};
 pub use organ2d::{Organ2d, OrganMaps};
 pub use organ3d::Organ3d;
 pub use organs::OrganNetwork;
+pub use relief2d::Relief2d;
 pub use runtime::{Runtime, RuntimeError};
 pub use sam::{Cutout, Embedding, SamDecoder, SamEncoder};
 pub use search::{find_manifest, find_manifests};

@@ -119,7 +119,7 @@ impl Organ2d {
     }
 }
 
-fn signature(ports: &[(&str, i64)]) -> Vec<Port> {
+pub(crate) fn signature(ports: &[(&str, i64)]) -> Vec<Port> {
     let port = |&(name, channels): &(&str, i64)| Port {
         name: name.to_owned(),
         shape: vec![-1, channels, -1, -1],
@@ -136,7 +136,7 @@ fn outputs() -> Vec<Port> {
 }
 
 /// The size nearest the image's proportions whose long side is `long_side` and whose sides are multiples of 16.
-fn working_size(width: u32, height: u32, long_side: u32) -> (u32, u32) {
+pub(crate) fn working_size(width: u32, height: u32, long_side: u32) -> (u32, u32) {
     let scale = f64::from(long_side) / f64::from(width.max(height));
     let side = |pixels: u32| {
         let multiples = (f64::from(pixels) * scale / f64::from(MULTIPLE)).round() as u32;

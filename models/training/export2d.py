@@ -1,4 +1,4 @@
-"""organ2d as ONNX, its manifest and its pins (values that Rust must find again)."""
+"""organ2d and relief2d as ONNX, their manifests and their pins (values that Rust must find again)."""
 
 import json
 
@@ -6,29 +6,35 @@ import numpy as np
 import torch
 
 from export import write_manifest
+from network import Depth, Relief2d
 
 PINNED_HEIGHT, PINNED_WIDTH, PINS_A_CHANNEL = 64, 96, 9
 INPUTS = {"image": [3, -1, -1]}
-OUTPUTS = {"sem": [4, -1, -1], "dist": [1, -1, -1], "depth": [1, -1, -1], "camera": [6]}
+OUTPUTS = {
+    "organ2d": {"sem": [4, -1, -1], "dist": [1, -1, -1], "depth": [1, -1, -1], "camera": [6]},
+    "relief2d": {"depth": [1, -1, -1]},
+}
 
 
 def write(network, folder, version, provenance):
-    """organ2d.onnx, organ2d.toml and organ2d.pins.json in `folder`."""
-    write_onnx(network, folder / "organ2d.onnx")
+    """NAME.onnx, NAME.toml and NAME.pins.json in `folder`; the name is the network's class, in small letters."""
+    name = type(network).__name__.lower()
+    network = Depth(network) if isinstance(network, Relief2d) else network
+    write_onnx(network, folder / f"{name}.onnx", OUTPUTS[name])
     ports = lambda them: [(name, [-1, *sides], "f32") for name, sides in them.items()]
     normalisation = "inside the graph: give RGB in 0..1, sides multiples of 16"
-    write_manifest(folder / "organ2d.toml", version, normalisation, ports(INPUTS), ports(OUTPUTS), provenance)
-    write_pins(network, folder / "organ2d.pins.json")
+    write_manifest(folder / f"{name}.toml", version, normalisation, ports(INPUTS), ports(OUTPUTS[name]), provenance)
+    write_pins(network, folder / f"{name}.pins.json", OUTPUTS[name])
 
 
-def write_onnx(network, path):
+def write_onnx(network, path, outputs):
     """Opset 17; n, h and w are the caller's. Batch normalisation is folded into the convolutions."""
-    axes = {name: {0: "n"} for name in INPUTS | OUTPUTS}
-    for name in ("image", "sem", "dist", "depth"):
+    axes = {name: {0: "n"} for name in INPUTS | outputs}
+    for name in axes.keys() - {"camera"}:
         axes[name] |= {2: "h", 3: "w"}
     torch.onnx.export(
         network.eval(), torch.rand(1, 3, PINNED_HEIGHT, PINNED_WIDTH), str(path), opset_version=17,
-        input_names=list(INPUTS), output_names=list(OUTPUTS), dynamic_axes=axes,
+        input_names=list(INPUTS), output_names=list(outputs), dynamic_axes=axes,
     )
 
 
@@ -38,13 +44,13 @@ def pinned_image():
     return ((x * x * (c + 1) + y * y * (3 - c) + 17 * x * y) % 251).astype(np.float32) / np.float32(250)
 
 
-def write_pins(network, path):
+def write_pins(network, path, outputs):
     """What PyTorch computes in single precision at some places of each output channel."""
     with torch.no_grad():
-        outputs = network.eval()(torch.from_numpy(pinned_image())[None])
+        found = network.eval()(torch.from_numpy(pinned_image())[None])
     random = np.random.default_rng(0)
     pins = []
-    for name, output in zip(OUTPUTS, outputs):
+    for name, output in zip(outputs, [found] if torch.is_tensor(found) else found):
         for c in range(output.shape[1]):
             for _ in range(PINS_A_CHANNEL if output.ndim == 4 else 1):
                 at = [c, *(int(random.integers(side)) for side in output.shape[2:])]

@@ -1,4 +1,4 @@
-"""organ2d: a residual U-Net of 0.9 million parameters, made of plain convolutions, with one look at the whole picture.
+"""organ2d and relief2d: one residual U-Net of 0.9 million parameters with two ways to tell depth, made of plain convolutions, with one look at the whole picture.
 
 Plain convolutions beat depthwise ones on a CPU (spec/models.md). All work is done at half the picture's size or less:
 the last convolution gives each pixel's four quarters as channels, so that thin stems keep their full resolution.
@@ -95,10 +95,13 @@ class Whole(nn.Module):
         return torch.cat([camera[:, :1], up, camera[:, 4:].clamp(-6, 1)], 1), self.plane(x), self.told(x)
 
 
-class Organ2d(nn.Module):
+class Eyes(nn.Module):
     """image [n, 3, h, w], RGB in 0..1, sides multiples of 16 -> sem logits [n, 4, h, w], dist in 0..1 [n, 1, h, w],
     log depth up to a constant [n, 1, h, w], camera [n, 6]: ln tan(hfov / 2); up as a unit vector in the camera's
-    frame (right, down, forward); ln of the standard deviations to expect of the first (a number) and of up (radians)."""
+    frame (right, down, forward); ln of the standard deviations to expect of the first (a number) and of up (radians).
+
+    Depth is that of a plane, whose inverse is linear in the picture, less `relief`, which the two networks tell in ways
+    of their own."""
 
     def __init__(self):
         super().__init__()
@@ -130,21 +133,39 @@ class Organ2d(nn.Module):
         for up, skip in zip(reversed(self.up), reversed(seen[1:-1])):
             x = up(x, skip)
         x = self.head(x)
-        # The inverse depth of a plane is linear in the picture. What stands on it is as near as the plane is at its foot,
-        # so the head is asked how far below a pixel that foot is seen: a local question, which neither the camera's tilt
-        # nor the distance enters.
         middle, slope = plane[:, :1, None, None], plane[:, 1:, None, None]
         inverse = middle + (slope * places(x)).sum(1, keepdim=True)
-        steepness = torch.sqrt((slope**2).sum(1, keepdim=True) + (LEVEL_STEEPNESS * middle) ** 2)
-        sem, dist, foot = x.split((4 * CLASSES, 4, 4), 1)
-        nearness = log_nearness(inverse)
-        relief = log_nearness(inverse.detach() + steepness.detach() * foot.float()) - nearness.detach()
-        ground = -nearness.repeat(1, 4, 1, 1)
+        sem, dist, last = x.split((4 * CLASSES, 4, 4), 1)
+        relief = self.relief(last.float(), middle, slope, inverse)
+        ground = -log_nearness(inverse).repeat(1, 4, 1, 1)
         sem, dist, ground, relief = (F.pixel_shuffle(part, 2) for part in (sem, dist, ground, relief))
         return sem, torch.sigmoid(dist), ground, relief, camera
 
-    def scale_relief(self, gain):
-        """The same network, with what stands on the ground this many times as high in the picture."""
-        with torch.no_grad():
-            self.head.weight[-4:] *= gain
-            self.head.bias[-4:] *= gain
+
+class Organ2d(Eyes):
+    """The head tells how much farther than the plane a pixel is."""
+
+    def relief(self, last, middle, slope, inverse):
+        return -last
+
+
+class Relief2d(Eyes):
+    """What stands on a ground is as near as the ground is at its foot, so the head is asked how far below a pixel that
+    foot is seen: a local question, which neither the camera's tilt nor the distance enters."""
+
+    def relief(self, foot, middle, slope, inverse):
+        middle, slope, plane = middle.detach(), slope.detach(), inverse.detach()
+        steepness = torch.sqrt((slope**2).sum(1, keepdim=True) + (LEVEL_STEEPNESS * middle) ** 2)
+        return log_nearness(plane + steepness * foot) - log_nearness(plane)
+
+
+class Depth(nn.Module):
+    """What relief2d.onnx holds of its network: depth. Organs and the camera are taught beside it, for they help depth (as
+    organ2d's depth helps its organs), and are left to organ2d in use."""
+
+    def __init__(self, network):
+        super().__init__()
+        self.network = network
+
+    def forward(self, image):
+        return self.network(image)[2]

@@ -159,10 +159,10 @@ fn with_models(models: &Path, arguments: &[&str]) -> (Option<i32>, Value, Output
     (output.status.code(), answer, output)
 }
 
-/// A folder with our network.
+/// A folder with our networks for pictures.
 fn models() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["organ2d.onnx", "organ2d.toml"] {
+    for name in ["organ2d.onnx", "organ2d.toml", "relief2d.onnx", "relief2d.toml"] {
         std::fs::copy(root().join("models").join(name), folder.path().join(name)).unwrap();
     }
     folder
@@ -181,9 +181,9 @@ fn models_are_installed_listed_verified_and_timed() {
 
     let (code, answer, _) = run(&["models", "list"]);
     let names: Vec<&str> = answer["models"].as_array().unwrap().iter().filter_map(|m| m["name"].as_str()).collect();
-    assert_eq!((code, &names[..]), (Some(0), &["organ2d", "torchvision_mask_rcnn", "u2netp"][..]));
-    assert_eq!(answer["models"][2]["provenance"], "a test");
-    assert!(answer["models"][2]["sha256"].as_str().is_some_and(|sha256| sha256.len() == 64));
+    assert_eq!((code, &names[..]), (Some(0), &["organ2d", "relief2d", "torchvision_mask_rcnn", "u2netp"][..]));
+    assert_eq!(answer["models"][3]["provenance"], "a test");
+    assert!(answer["models"][3]["sha256"].as_str().is_some_and(|sha256| sha256.len() == 64));
     assert!(answer["models"][0]["provenance"].as_str().is_some_and(|p| p.contains("train_organ2d.py")));
 
     let (code, answer, _) = run(&["models", "bench", "u2netp", "--calls", "1", "--threads", "2"]);
@@ -198,8 +198,8 @@ fn models_are_installed_listed_verified_and_timed() {
     bytes[100] ^= 1;
     std::fs::write(&path, bytes).unwrap();
     let (code, answer, _) = run(&["models", "verify"]);
-    assert_eq!((code, &answer["models"][0]["ok"], &answer["models"][2]["ok"]), (Some(1), &true.into(), &false.into()));
-    assert!(answer["models"][2]["why"].as_str().is_some_and(|why| why.contains("expected sha256")));
+    assert_eq!((code, &answer["models"][0]["ok"], &answer["models"][3]["ok"]), (Some(1), &true.into(), &false.into()));
+    assert!(answer["models"][3]["why"].as_str().is_some_and(|why| why.contains("expected sha256")));
 }
 
 #[test]
@@ -251,17 +251,23 @@ fn a_composition_takes_what_each_network_says_and_goes_on_without_those_that_fai
         let warnings: Vec<String> = warnings.iter().filter_map(|w| w.as_str().map(str::to_owned)).collect();
         (answer["plants"][0].clone(), warnings.into_iter().filter(|w| w.contains("models.")).collect::<Vec<_>>())
     };
-    let (alone, said) = photo("");
+    let (alone, said) = photo("[models]\ndepth = 'organ2d'");
     assert_eq!((&alone["scale_source"], said), (&"none".into(), Vec::<String>::new()));
     // Metres come with a metric network.
     let (metric, said) = photo("[models]\ndepth = 'depth_anything'");
     assert_eq!((&metric["scale_source"], said), (&"metric_model".into(), Vec::<String>::new()));
-    // What fails leaves just what our network says.
+    // By default depth is relief2d's.
+    let (relief, said) = photo("");
+    assert_eq!(said, Vec::<String>::new());
+    assert_ne!(relief["organs"], alone["organs"]);
+    // What fails leaves just what organ2d says.
+    std::fs::write(folder.path().join("relief2d.onnx"), "no model").unwrap();
     for (text, role, why) in [
+        ("", "models.depth", "expected sha256"),
         ("depth = 'depth_nan'", "models.depth", "NaN"),
         ("depth = 'nowhere'", "models.depth", "no nowhere.toml"),
-        ("organs = 'depth_anything'", "models.organs", "DepthAnythingMetric"),
-        ("mask = ['sam2_encoder']", "models.mask", "Sam2Encoder"),
+        ("depth = 'organ2d'\norgans = 'depth_anything'", "models.organs", "DepthAnythingMetric"),
+        ("depth = 'organ2d'\nmask = ['sam2_encoder']", "models.mask", "Sam2Encoder"),
     ] {
         let (plant, said) = photo(&format!("[models]\n{text}"));
         assert_eq!(plant["organs"], alone["organs"], "{text}");

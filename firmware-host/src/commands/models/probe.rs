@@ -35,7 +35,7 @@ impl Probe {
                 let cloud = pyramid::of(&waves()).ok();
                 Box::new(move || cloud.as_ref().map_or(Ok(()), |cloud| network.run(cloud).map(drop)))
             }
-            Layout::DepthAnything | Layout::DepthAnythingMetric | Layout::Meter => {
+            Layout::Relief2d | Layout::DepthAnything | Layout::DepthAnythingMetric | Layout::Meter => {
                 let mut network = DepthNetwork::open(runtime, path, threads)?;
                 Box::new(move || network.run(&grey).map(drop))
             }

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use demeter_frame::Tilt;
-use demeter_models::{CameraGuess, Organ2d};
+use demeter_models::CameraGuess;
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
-use super::{Goal, Row};
+use super::{Goal, Ours, Row};
 use crate::commands::eval::clouds::some;
 use crate::commands::eval::{files_of, progress};
 use crate::error::CommandError;
@@ -65,7 +65,7 @@ struct CameraModel {
 }
 
 /// Field of view and tilt of every `*_rgb` picture of a scan.
-pub(super) fn judge(network: &mut Organ2d, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
+pub(super) fn judge(network: &mut Ours, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
     let is_photo = |path: &std::path::PathBuf| path.to_string_lossy().ends_with("_rgb.json");
     let paths = files_of(&folder.join("metadata/images"), "json")?.into_iter().filter(is_photo).collect();
     let paths = some(paths, every);
@@ -78,7 +78,7 @@ pub(super) fn judge(network: &mut Organ2d, folder: &Path, every: usize) -> Resul
         let fx = *camera.camera_model.params.first().ok_or_else(|| bad("a camera without focal length".into()))?;
         let picture = path.with_extension("png").file_name().map(|name| folder.join("images").join(name));
         let picture = files::photo(&picture.unwrap_or_default())?;
-        let maps = network.run(&picture).map_err(|error| CommandError::failed("model", &error))?;
+        let maps = network.run(&picture)?;
         // Rows of the matrix are its transpose's columns.
         let up = DMat3::from_cols_array_2d(&camera.rotmat).transpose() * DVec3::Z;
         cameras.add(&maps.camera, 2.0 * (0.5 * camera.camera_model.width / fx).atan(), Tilt::of_up(up));

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use demeter_models::Organ2d;
 use image::{GrayImage, imageops};
 
 use super::relative::{Pair, abs_rel};
-use super::{Goal, Row};
+use super::{Goal, Ours, Row};
 use crate::commands::eval::clouds::some;
 use crate::commands::eval::green::green;
 use crate::commands::eval::{files_of, progress};
@@ -23,7 +22,7 @@ const GOAL: f64 = 0.7;
 const MIN_PIXELS: usize = 100;
 
 /// Inverse depth on plants and on everything, and how well the plants themselves are found.
-pub(super) fn judge(network: &mut Organ2d, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
+pub(super) fn judge(network: &mut Ours, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
     let row = |figure, goal| Row { set: "fields".into(), figure, ours: Vec::new(), ramp: Vec::new(), goal };
     let mut plants = row("AbsRel on plants", Goal::OfRamp(GOAL));
     let mut all = row("AbsRel on all", Goal::Nothing);
@@ -35,7 +34,7 @@ pub(super) fn judge(network: &mut Organ2d, folder: &Path, every: usize) -> Resul
         let picture = files::photo(&path)?;
         let codes =
             depth_codes(&folder.join("depth").join(path.file_name().unwrap_or_default()), picture.dimensions())?;
-        let maps = network.run(&picture).map_err(|error| CommandError::failed("model", &error))?;
+        let maps = network.run(&picture)?;
         let (green, semantic) = (green(&picture), maps.semantic());
         let (mut pairs, mut on_plants, mut ramp, mut ramp_on_plants) = (vec![], vec![], vec![], vec![]);
         let (mut both, mut either) = (0usize, 0usize);

@@ -1,16 +1,19 @@
-//! `demeter eval depth`: what our network says of single pictures, beside what is known: depth and plants of fields, the
+//! `demeter eval depth`: what our networks say of single pictures, beside what is known: depth and plants of fields, the
 //! camera, organs.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use demeter_models::{Organ2d, Runtime, find_manifest};
+use demeter_frame::Rgb;
+use demeter_models::{DepthNetwork, Organ2d, OrganMaps, Runtime, find_manifest};
 use demeter_recon::statistics::{mean, median};
 
 use super::folder;
 use super::table::{Cell, Table};
+use crate::config::{ModelsConfig, OURS};
 use crate::error::CommandError;
 use crate::eye::EyeError;
+use crate::raster::nearest;
 
 mod camera;
 mod fields;
@@ -65,7 +68,7 @@ enum Goal {
 pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
     let columns = ["set", "figure", "pictures", "mean", "median", "ramp", "goal", "share within"];
     let mut table = Table::new("depth", &columns);
-    let mut network = open(args.size).map_err(CommandError::from)?;
+    let mut network = Ours::open(args.size).map_err(CommandError::from)?;
     let mut rows = fields::judge(&mut network, &folder(args.fields.as_ref(), "field-rows", "--fields")?, args.every)?;
     let scan = folder(args.scan.as_ref(), "multiview/virtual_plant", "--scan")?;
     rows.extend(camera::judge(&mut network, &scan, args.every)?);
@@ -87,9 +90,28 @@ pub(super) fn table(args: &Args) -> Result<Table, CommandError> {
     Ok(table)
 }
 
-fn open(long_side: u32) -> Result<Organ2d, EyeError> {
-    let runtime = Runtime::load(None)?;
-    Ok(Organ2d::open(&runtime, &find_manifest("organ2d")?, NonZeroUsize::MIN)?.with_long_side(long_side)?)
+/// Our networks, as a photo is given to them.
+struct Ours {
+    organs: Organ2d,
+    depth: DepthNetwork,
+}
+
+impl Ours {
+    fn open(long_side: u32) -> Result<Self, EyeError> {
+        let runtime = Runtime::load(None)?;
+        let organs = Organ2d::open(&runtime, &find_manifest(OURS)?, NonZeroUsize::MIN)?.with_long_side(long_side)?;
+        let depth = find_manifest(&ModelsConfig::default().depth)?;
+        Ok(Self { organs, depth: DepthNetwork::open(&runtime, &depth, NonZeroUsize::MIN)? })
+    }
+
+    /// What they say of a picture, depth by the network for it.
+    fn run(&mut self, picture: &Rgb) -> Result<OrganMaps, CommandError> {
+        let failed = |error| CommandError::failed("model", &error);
+        let mut maps = self.organs.run(picture).map_err(failed)?;
+        let depth = self.depth.run(picture).map_err(failed)?.log_depth();
+        maps.log_depth = nearest(&depth, maps.dist.width(), maps.dist.height());
+        Ok(maps)
+    }
 }
 
 impl Row {

@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use demeter_frame::{Rgb, Semantic, Tilt};
-use demeter_models::Organ2d;
 use serde::Deserialize;
 
 use super::camera::Cameras;
 use super::relative::{Pair, abs_rel};
-use super::{Goal, Row};
+use super::{Goal, Ours, Row};
 use crate::commands::eval::progress;
 use crate::error::CommandError;
 use crate::files;
@@ -79,7 +78,7 @@ impl Set {
 }
 
 /// Camera, depth on plants, plants and stems.
-pub(super) fn judge(network: &mut Organ2d, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
+pub(super) fn judge(network: &mut Ours, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
     let set = Set::read(folder)?;
     let row = |figure, goal| {
         let name = folder.file_name().unwrap_or(folder.as_os_str());
@@ -95,7 +94,7 @@ pub(super) fn judge(network: &mut Organ2d, folder: &Path, every: usize) -> Resul
     for i in (0..set.meta.count).step_by(every.max(1)) {
         bar.inc(1);
         let Some(picture) = set.picture(i) else { continue };
-        let maps = network.run(&picture).map_err(|error| CommandError::failed("model", &error))?;
+        let maps = network.run(&picture)?;
         let [hfov, pitch, roll] = set.camera(i);
         cameras.add(&maps.camera, hfov, Tilt { pitch, roll });
         let semantic = maps.semantic();

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use demeter_models::Organ2d;
 use demeter_recon::statistics::quantile;
 
-use super::{Goal, Row};
+use super::{Goal, Ours, Row};
 use crate::commands::eval::clouds::some;
 use crate::commands::eval::{files_of, progress};
 use crate::error::CommandError;
@@ -18,14 +17,14 @@ const POT: f64 = 0.06;
 const EDGE: f64 = 0.02;
 
 /// IoU of the plants with what is not white above the pot's rim.
-pub(super) fn judge(network: &mut Organ2d, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
+pub(super) fn judge(network: &mut Ours, folder: &Path, every: usize) -> Result<Vec<Row>, CommandError> {
     let paths = some(files_of(folder, "jpg")?, every);
     let bar = progress(paths.len());
     let mut ious = Vec::new();
     for path in paths {
         bar.inc(1);
         let picture = files::photo(&path)?;
-        let maps = network.run(&picture).map_err(|error| CommandError::failed("model", &error))?;
+        let maps = network.run(&picture)?;
         let semantic = maps.semantic();
         let darkest = |p: &image::Rgb<u8>| f64::from(p.0[0].min(p.0[1]).min(p.0[2]));
         let light = quantile(picture.pixels().map(darkest), 0.9).unwrap_or(255.0);
