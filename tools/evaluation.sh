@@ -81,7 +81,7 @@ END
 
 ## Depth and camera
 
-\`demeter eval depth\`: organ2d alone on single pictures.
+\`demeter eval depth\`: organ2d and, for depth, relief2d on single pictures.
 
 END
     "$demeter" eval depth --every "$every"

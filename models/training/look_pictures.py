@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Paints what a checkpoint of organ2d sees in photos: photo, classes, boundaries and depth side by side, with the camera in words, to look at.
+"""Paints what a checkpoint of organ2d or relief2d sees in photos: photo, classes, boundaries and depth side by side, with the camera in words, to look at.
 
 Where plants stand before a light wall, a threshold on colour gives a mask to compare with (`--before-light`): its
 figure is a sanity check on real photos, not truth, and never training data.
@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from PIL import Image, ImageDraw
 
-from network import Organ2d
+from network import Organ2d, Relief2d
 
 COLOURS = np.array([[0, 0, 0], [70, 200, 70], [240, 170, 40], [230, 40, 40]], np.uint8)
 LONG_SIDE = 384
@@ -49,13 +49,14 @@ def words(camera):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("network", choices=["organ2d", "relief2d"])
     parser.add_argument("checkpoint", type=pathlib.Path)
     parser.add_argument("images", nargs="+", type=pathlib.Path)
     parser.add_argument("-o", "--out", type=pathlib.Path)
     parser.add_argument("--before-light", action="store_true", help="compare with what is green or dark above the pot")
     args = parser.parse_args()
     torch.set_num_threads(1)
-    network = Organ2d().eval()
+    network = {"organ2d": Organ2d, "relief2d": Relief2d}[args.network]().eval()
     network.load_state_dict(torch.load(args.checkpoint)["average"])
     rows, overlaps = [], []
     for path in args.images:
