@@ -10,6 +10,7 @@ use glam::DVec2;
 
 use crate::config::ModelsConfig;
 use crate::error::CommandError;
+use crate::far;
 pub use crate::networks::Degraded;
 use crate::networks::{Networks, Scene};
 
@@ -142,9 +143,7 @@ impl Eye {
     /// # Errors
     /// [`SightError::Network`] when the network fails.
     pub fn plants(&mut self, picture: &Rgb) -> Result<Mask, SightError> {
-        let [mut plant, ..] = self.maps(picture)?.probabilities;
-        plant.iter_mut().for_each(|p| *p = 1.0 - *p);
-        Ok(plant)
+        Ok(self.maps(picture)?.plants())
     }
 
     /// Looks at a picture. With a place in the world the ground gives metres; without one the plants are put at 1 m.
@@ -172,8 +171,15 @@ impl Eye {
         camera: &Intrinsics,
         world_from_camera: Option<Pose>,
     ) -> Result<Sight, SightError> {
-        let Scene { semantic, dist, log_depth, divided, metric, scale: enlargement, degraded } =
+        // In a row the same plants soon come near; a photo is all there is.
+        let is_far = world_from_camera.is_none() && self.networks.organs_are_ours() && far::is_far(&maps);
+        let maps = if is_far { self.networks.maps_at(picture, far::LONG_SIDE)? } else { maps };
+        let plants = is_far.then(|| maps.plants());
+        let Scene { mut semantic, dist, log_depth, divided, metric, scale: enlargement, degraded } =
             self.networks.scene(picture, maps, camera, world_from_camera.is_some())?;
+        if let Some(plants) = plants {
+            far::sharpen(&mut semantic, picture, &plants);
+        }
         let (width, height) = semantic.dimensions();
         let view = View {
             semantic: &semantic,

@@ -14,6 +14,7 @@ pub mod describe;
 pub mod divider;
 pub mod error;
 pub mod eye;
+mod far;
 pub mod files;
 pub mod lens;
 pub mod mesh_file;

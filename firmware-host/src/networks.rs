@@ -102,6 +102,16 @@ impl Networks {
         self.ours.run(picture)
     }
 
+    /// The same of a picture made `long_side` pixels long.
+    pub(crate) fn maps_at(&mut self, picture: &Rgb, long_side: u32) -> Result<OrganMaps, ModelError> {
+        self.ours.run_at(picture, long_side)
+    }
+
+    /// Nobody else's says what is a plant or an organ.
+    pub(crate) fn organs_are_ours(&self) -> bool {
+        self.mask.is_none() && self.organs.is_none()
+    }
+
     /// The scene of a picture and what ours says of it; what of the others fails is left out and said.
     /// On a `known_ground`, whose plane corrects depth, organ2d's tells the plants of a row apart better than relief2d's
     /// (docs/training.md).

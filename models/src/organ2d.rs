@@ -39,6 +39,15 @@ impl OrganMaps {
         (at(x, self.scale[0], width), at(y, self.scale[1], height))
     }
 
+    /// The probability that each pixel shows a plant.
+    #[must_use]
+    pub fn plants(&self) -> Mask {
+        let [background, ..] = &self.probabilities;
+        let mut plants = background.clone();
+        plants.iter_mut().for_each(|p| *p = 1.0 - *p);
+        plants
+    }
+
     /// The likeliest class of each pixel, as the number of its [`Semantic`].
     #[must_use]
     pub fn semantic(&self) -> GrayImage {
@@ -81,10 +90,7 @@ impl Organ2d {
     /// # Errors
     /// [`ModelError::LongSide`] unless it is a multiple of 16 from 16 to 2048.
     pub fn with_long_side(self, long_side: u32) -> Result<Self, ModelError> {
-        if long_side == 0 || long_side > MAX_LONG_SIDE || !long_side.is_multiple_of(MULTIPLE) {
-            return Err(ModelError::LongSide { found: long_side });
-        }
-        Ok(Self { long_side, ..self })
+        Ok(Self { long_side: possible(long_side)?, ..self })
     }
 
     /// The verified model.
@@ -98,8 +104,16 @@ impl Organ2d {
     /// # Errors
     /// [`ModelError::EmptyImage`], [`ModelError::Shape`], and those of [`Model::run`].
     pub fn run(&mut self, image: &Rgb) -> Result<OrganMaps, ModelError> {
+        self.run_at(image, self.long_side)
+    }
+
+    /// [`Organ2d::run`] at another long side, in pixels.
+    ///
+    /// # Errors
+    /// As there, and those of [`Organ2d::with_long_side`].
+    pub fn run_at(&mut self, image: &Rgb, long_side: u32) -> Result<OrganMaps, ModelError> {
         let (width, height) = dimensions(image)?;
-        let (w, h) = working_size(width, height, self.long_side);
+        let (w, h) = working_size(width, height, possible(long_side)?);
         let picture = planes(&resized(image, (w, h), FilterType::Triangle), |_, value| value / 255.0);
         let outputs = self.model.run(&[("image", picture.insert_axis(Axis(0)).into())])?;
         let map = |name, channels| outputs.f32(name, [1, channels, i64::from(h), i64::from(w)]);
@@ -117,6 +131,11 @@ impl Organ2d {
             camera: CameraGuess::of(outputs.f32("camera", [1, CameraGuess::NUMBERS as i64])?.row(0), sx / sy),
         })
     }
+}
+
+fn possible(long_side: u32) -> Result<u32, ModelError> {
+    let is_possible = (1..=MAX_LONG_SIDE).contains(&long_side) && long_side.is_multiple_of(MULTIPLE);
+    is_possible.then_some(long_side).ok_or(ModelError::LongSide { found: long_side })
 }
 
 pub(crate) fn signature(ports: &[(&str, i64)]) -> Vec<Port> {

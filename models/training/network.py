@@ -159,6 +159,11 @@ class Relief2d(Eyes):
         return log_nearness(plane + steepness * foot) - log_nearness(plane)
 
 
+# The share of relief that relief2d.onnx tells. How high plants are is hardly seen: on pictures held out half of what was
+# learned is as near the truth as all of it (0.1012 and 0.1011, 0.1007 at best), and the less is told the less can be wrong.
+RELIEF_TOLD = 0.5
+
+
 class Depth(nn.Module):
     """What relief2d.onnx holds of its network: depth. Organs and the camera are taught beside it, for they help depth (as
     organ2d's depth helps its organs), and are left to organ2d in use."""
@@ -168,4 +173,5 @@ class Depth(nn.Module):
         self.network = network
 
     def forward(self, image):
-        return self.network(image)[2]
+        _, _, ground, relief, _ = self.network.parts(image)
+        return ground - RELIEF_TOLD * relief

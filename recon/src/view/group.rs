@@ -32,6 +32,11 @@ const SCRAP: f64 = 0.2;
 /// A leaf with less than this share of the pixels of its plant's largest is a speck: an edge, a petiole's end. Set after
 /// looking at one soybean, whose specks have up to 0.020 and whose smallest leaflet 0.25.
 const SPECK: f64 = 1.0 / 40.0;
+/// A leaf alone is a seedling, whose other leaves are hidden behind it or too small to see, when it has at least this share
+/// of the pixels of the picture's largest plant (a guess; in fields the lower it is, the more weeds are plants) and at most
+/// this share of the picture's: what is larger is a leaf held before the camera (a guess, too).
+const SEEDLING: f64 = 0.02;
+const LEAF_BEFORE_CAMERA: f64 = 0.1;
 /// Share of points at either end of an organ that make its end.
 const END: f64 = 0.03;
 
@@ -68,7 +73,7 @@ pub enum GroupError {
     /// A speck of leaf.
     #[error("expected leaves of about the size of the plant's largest, found a speck")]
     Speck,
-    /// No main stem, and too little to say where it would be.
+    /// No main stem, and too little to say where it would be: one organ in a row, or in a photo one that is no seedling.
     #[error("expected a main stem or at least two organs, found one organ")]
     NoMainStem,
 }
@@ -91,7 +96,7 @@ pub struct Refused {
 pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Refused>) {
     let up = super::scale::up(view);
     let near: Vec<Near> = organs.iter().map(|organ| Near::new(&organ.cloud.points)).collect();
-    let pixels = |stem: &Vec<usize>| stem.iter().map(|&i| organs[i].region.pixels).sum::<usize>() as f64;
+    let pixels = |members: &Vec<usize>| members.iter().map(|&i| organs[i].region.pixels).sum::<usize>() as f64;
     let stems = main_stems(organs, &near);
     let least = SCRAP * stems.iter().map(pixels).fold(0.0, f64::max);
     let (mut plants, scraps): (Vec<_>, Vec<_>) = stems.into_iter().partition(|stem| pixels(stem) >= least);
@@ -103,6 +108,12 @@ pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Re
         let mut ids: Vec<u16> = members.iter().map(|&m| organs[m].region.id).collect();
         ids.sort_unstable();
         ids
+    };
+    // In a row every plant is seen again and again, and a leaf alone is a neighbour's.
+    let in_row = view.world_from_camera.is_some();
+    let largest = plants.iter().map(pixels).fold(0.0, f64::max);
+    let is_seedling = |members: &Vec<usize>| {
+        !in_row && (SEEDLING * largest..LEAF_BEFORE_CAMERA * view.semantic.len() as f64).contains(&pixels(members))
     };
     let mut views = Vec::new();
     let scrap = |stem: &Vec<usize>| Refused { instances: ids(stem), reason: GroupError::Scrap };
@@ -116,7 +127,7 @@ pub fn group(view: &View<'_>, organs: &[LiftedOrgan]) -> (Vec<PlantView>, Vec<Re
         let instances = ids(&members);
         if leaves == 0 {
             refused.push(Refused { instances, reason: GroupError::NoLeaf });
-        } else if i >= rooted && members.len() < 2 {
+        } else if i >= rooted && members.len() < 2 && !is_seedling(&members) {
             refused.push(Refused { instances, reason: GroupError::NoMainStem });
         } else {
             views.push(plant(view, organs, &members, instances, up));
