@@ -1,7 +1,7 @@
 //! A photo to one fitted plant: by its organs in depth, or, where a grass is seen from the side, by its silhouette.
 
 use demeter_frame::{Intrinsics, Pose, Rgb};
-use demeter_recon::fit::{Fitted, pictured, to_picture};
+use demeter_recon::fit::{Fitted, in_picture, pictured};
 use demeter_recon::model::{Habit, Plant, Species};
 use demeter_recon::organs::ScaleSource;
 use demeter_recon::view::strap::{SideView, Silhouette, Sketch};
@@ -12,7 +12,7 @@ use image::GrayImage;
 use crate::describe::{Described, Encoding, describe};
 use crate::eye::{Eye, PlantSight, SightError};
 use crate::picture::Crop;
-use crate::reconstruct::{ReconstructError, fit_organs};
+use crate::reconstruct::{ReconstructError, organ_tree};
 use crate::report::Camera;
 
 /// Without a pose the camera is taken to be level: up is up in the picture.
@@ -49,8 +49,8 @@ impl Portrait {
         scale_source: ScaleSource,
     ) -> Result<Self, ReconstructError> {
         let (stand_in, cut) = (sight.plant.stand_in, sight.plant.touches_border);
-        let (mut fitted, tree) = fit_organs(sight.plant.organs, species, UP)?;
-        to_picture(&mut fitted, |organ, base| shown(&tree.organs[organ], base, camera), species, UP)?;
+        let tree = organ_tree(sight.plant.organs)?;
+        let fitted = in_picture(&tree, |organ, base| shown(&tree.organs[organ], base, camera), species, UP)?;
         let cloud = tree.organs.into_iter().flat_map(|organ| organ.points).collect();
         let mut portrait = Self::described(fitted, cloud, species, camera, scale_source)?;
         let warnings = &mut portrait.described.report.warnings;

@@ -37,8 +37,15 @@ impl ReconstructError {
     }
 }
 
-/// Joins a view's organs to a tree, without the stems that carry nothing, and fits it; gives the tree too. `up` is
-/// the vertical of their frame.
+/// Joins a view's organs to a tree, without the stems that carry nothing.
+///
+/// # Errors
+/// [`TreeError`] when they form none.
+pub fn organ_tree(organs: Vec<OrganCloud>) -> Result<OrganTree, TreeError> {
+    Ok(tree::without_bare_stems(tree::build(organs)?))
+}
+
+/// Fits the tree of a view's organs; gives the tree too. `up` is the vertical of their frame.
 ///
 /// # Errors
 /// [`ReconstructError`] when they form no tree or cannot be fitted.
@@ -47,7 +54,7 @@ pub fn fit_organs(
     species: &Species,
     up: DVec3,
 ) -> Result<(Fitted, OrganTree), ReconstructError> {
-    let tree = tree::without_bare_stems(tree::build(organs)?);
+    let tree = organ_tree(organs)?;
     let fitted = fit::plant(&tree, species, up)?;
     Ok((fitted, tree))
 }

@@ -27,7 +27,7 @@ pub use error::FitError;
 pub(crate) use error::{MIN_EXTENT, MIN_POINTS};
 use glam::{DQuat, DVec3};
 pub use lone::{LoneBlade, lone_blade};
-pub use pictured::{NODES, Pictured, pictured, to_picture};
+pub use pictured::{NODES, Pictured, pictured};
 
 use crate::cloud::thinned;
 use crate::model::{Plant, PlantError, Similarity, Species};
@@ -70,6 +70,33 @@ pub struct Fitted {
 /// # Errors
 /// [`FitError`] when the main stem cannot be fitted, or when the tree is none.
 pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, FitError> {
+    fitted(tree, species, up, |builder, points| builder.sharpen(points))
+}
+
+/// Fits a plant to organs lifted from one picture, in its camera's frame, and moves its blades to where the picture
+/// shows them: turn, size, shape and bends of each. `shown` gives each organ of the tree that is seen, where it hangs.
+///
+/// # Errors
+/// Those of [`plant`].
+pub fn in_picture(
+    tree: &OrganTree,
+    shown: impl Fn(usize, DVec3) -> Option<Pictured>,
+    species: &Species,
+    up: DVec3,
+) -> Result<Fitted, FitError> {
+    // A network's depth is a smooth surface: where a blade does not fit it, no scanner's noise has smeared it.
+    let mut fitted = fitted(tree, species, up, |_, _| ())?;
+    pictured::to_picture(&mut fitted, shown, species, up)?;
+    Ok(fitted)
+}
+
+/// A plant whose blades are gone over again by `sharpen`, which gets the points of each organ of the tree.
+fn fitted(
+    tree: &OrganTree,
+    species: &Species,
+    up: DVec3,
+    sharpen: impl FnOnce(&mut Builder<'_>, &dyn Fn(usize) -> usize),
+) -> Result<Fitted, FitError> {
     check(tree)?;
     let few: Vec<Vec<DVec3>> = tree.organs.iter().map(|organ| thinned(&organ.points, MAX_POINTS)).collect();
     let source = |organ: usize| Source { organ, kind: tree.organs[organ].kind, points: &few[organ] };
@@ -90,7 +117,7 @@ pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, F
         }));
     }
     let counts = |organ: usize| tree.organs[organ].points.len();
-    builder.sharpen(counts);
+    sharpen(&mut builder, &counts);
     leaflets::group(&mut builder.organs, species.habit);
     builder.doubt(counts);
     let mut plant = Plant { world_from_plant, organs: builder.organs };

@@ -59,12 +59,9 @@ pub fn pictured(stem: &[DVec3], blades: &[Pictured], species: &Species, up: DVec
     Ok(Fitted { plant, organs: builder.fits, dropped: Vec::new() })
 }
 
-/// Moves blades of a plant fitted in the camera's frame to where its picture shows them: turn, size, shape and bends of
-/// each; where they hang stands. `shown` gives each organ of the tree that is seen.
-///
-/// # Errors
-/// [`PlantError`] when the plant is none.
-pub fn to_picture(
+/// Moves blades of a plant fitted in the camera's frame to where its picture shows them: see [`super::in_picture`]. Where
+/// they hang stands.
+pub(super) fn to_picture(
     fitted: &mut Fitted,
     shown: impl Fn(usize, DVec3) -> Option<Pictured>,
     species: &Species,
