@@ -12,6 +12,8 @@
 //! and looks at exposure, sharpness and, over time, the lens ([`LensWatch`]). A frame that is no good ends in exactly one [`Reason`] and the run goes on; only
 //! a broken recording as a whole ([`SessionError`]) or a source that is gone ([`SourceError::Lost`]) stops it.
 //!
+//! [`parse_calibration`] reads what other programs know of a camera's lens.
+//!
 //! A [`Receiver`] gives [`Positions`]: where the rig was at the time of a frame.
 //!
 //! Spec: appliance.md "Data path", "Cameras", "A recorded session"; reliability.md 23 and 24. The crate knows no network,
@@ -19,6 +21,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod calibration;
 mod camera;
 mod counts;
 mod gate;
@@ -33,6 +36,7 @@ mod session;
 mod source;
 mod v4l2;
 
+pub use calibration::{CalibrationError, camera_info, parse_calibration};
 pub use camera::{
     Backend, CameraFault, CameraHealth, CameraSettings, CameraState, Cameras, CamerasHealth, Controls, Mode, Mount,
     Speed, longest_exposure, sampling,

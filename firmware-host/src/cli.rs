@@ -26,7 +26,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// List cameras, look through one, record them.
+    /// List cameras, look through one, record them, calibrate them.
     Camera(camera::Args),
     /// Turn a record back into its plant.
     Decode(decode::Args),

@@ -351,6 +351,10 @@ mod tests {
                 "[source]\nkind = 'cameras'\n[[cameras]]\nid = 'a'\ndevice = 'b'\nhfov_deg = 60\nheight_m = 1",
                 &["source.speed_m_per_s", "a receiver in [position]", "neither"],
             ),
+            (
+                "[[cameras]]\nid = 'a'\ndevice = 'b'\nheight_m = 1",
+                &["cameras.hfov_deg", "10 to 170 degrees, or a file under calibration", "neither"],
+            ),
             ("[position]\nsource = 'gps'", &["unknown variant `gps`", "`speed`, `gpsd`, `nmea`"]),
             ("[position]\nlatency_s = nan", &["position.latency_s", "0 to 5 seconds", "NaN"]),
             ("[position]\nbaud = 5", &["position.baud", "bits a second", "5"]),

@@ -4,13 +4,13 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 
-use demeter_capture::decode_photo;
-use demeter_frame::Rgb;
+use demeter_capture::{decode_photo, parse_calibration};
+use demeter_frame::{Calibration, Rgb};
 use demeter_recon::model::{Plant, Species};
 use demeter_recon::record::{self, Record, RecordError};
 use demeter_recon::species::NAMES;
 
-use crate::error::{CommandError, Exit};
+use crate::error::{CommandError, Exit, chain};
 use crate::mesh_file::MeshFormat;
 
 /// Largest input file, bytes: 20 million points of a scan with colours and labels.
@@ -37,6 +37,20 @@ pub fn read(path: &Path) -> Result<Vec<u8>, CommandError> {
 /// [`CommandError`] `file` when it cannot be read, `bad_image` when it is no picture.
 pub fn photo(path: &Path) -> Result<Rgb, CommandError> {
     decode_photo(&read(path)?).map_err(|error| CommandError::failed("bad_image", &error).of(path))
+}
+
+/// Reads a calibration file: Kalibr's, ROS', OpenCV's or a JSON object of intrinsics. One camera of several in a chain is
+/// named behind the file, as `chain.yaml#cam1`.
+///
+/// # Errors
+/// [`CommandError`] `file` when it cannot be read, `calibration` (bad use) naming the file and the key.
+pub fn calibration(path: &Path) -> Result<Calibration, CommandError> {
+    let text = path.to_string_lossy();
+    let (file, camera) = match text.rsplit_once('#') {
+        Some((file, camera)) if !path.exists() => (Path::new(file), Some(camera)),
+        _ => (path, None),
+    };
+    parse_calibration(&read(file)?, camera).map_err(|error| CommandError::usage("calibration", chain(&error)).of(path))
 }
 
 /// Writes a file whole: beside its place first, so that nobody sees half of it.

@@ -4,6 +4,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod api;
+pub mod board;
 pub mod cli;
 pub mod clock;
 pub mod commands;

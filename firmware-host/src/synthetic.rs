@@ -54,6 +54,7 @@ impl Synthetic {
             id: self.camera.clone(),
             height_above_ground_m: self.poses.first().map(|pose| pose.translation.z),
             intrinsics: self.intrinsics,
+            distortion: None,
             rig_from_camera: None,
         };
         Manifest {

@@ -7,6 +7,7 @@
 
 mod axes;
 pub mod baseline;
+pub mod calibrate;
 pub mod cloud;
 mod distance;
 pub mod edit;

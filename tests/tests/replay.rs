@@ -3,7 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
+use demeter_capture::{Manifest, Pace, Recorder, Replay, SessionCamera, Source, decode};
+use demeter_frame::{Distortion, Frame, Rgb};
 use demeter_tests::{answer, demeter, root};
+use glam::DVec2;
+use image::codecs::jpeg::JpegEncoder;
+use image::imageops::interpolate_bilinear;
 use rusqlite::Connection;
 use serde_json::Value;
 
@@ -54,6 +59,53 @@ fn the_bundled_session_becomes_its_plants_and_two_replays_agree_to_the_byte() {
         let (code, shown) = answer(&["plants", "show", id, "--db", first.to_str().unwrap()]);
         assert_eq!((code, &shown["plants"][0]["traits"]), (Some(0), &plant["traits"]));
     }
+}
+
+/// The bundled session as a camera would have seen it whose lens bends pictures outwards.
+fn bent(folder: &Path) -> Manifest {
+    let mut source = Replay::open(&fixture(), Pace::Max).unwrap();
+    let mut manifest = source.manifest().clone();
+    let pinhole = manifest.cameras[0].intrinsics;
+    manifest.cameras[0].distortion = Some(Distortion::PlumbBob { coefficients: [0.5, 0.1, 2e-3, -2e-3, 0.0] });
+    let camera = manifest.cameras[0].calibration().unwrap();
+    let mut recorder = Recorder::create(folder, manifest.clone()).unwrap();
+    while let Some(frame) = source.next().unwrap() {
+        let straight = decode(&frame).unwrap();
+        let bent = Rgb::from_fn(pinhole.width, pinhole.height, |x, y| {
+            let ray = camera.unproject(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), 1.0).unwrap();
+            let at = pinhole.project(ray).unwrap() - 0.5;
+            interpolate_bilinear(&straight, at.x as f32, at.y as f32).unwrap_or(image::Rgb([0; 3]))
+        });
+        let mut bytes = Vec::new();
+        JpegEncoder::new_with_quality(&mut bytes, 95).encode_image(&bent).unwrap();
+        recorder.write(&Frame { bytes: bytes.into(), ..frame }).unwrap();
+    }
+    recorder.finish().unwrap();
+    manifest
+}
+
+#[test]
+fn what_a_lens_bends_is_measured_as_if_it_did_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = folder.path().join("bent");
+    let manifest = bent(&session);
+    let heights = |session: &Path, db: &str| {
+        let (code, replayed) = replay(session, &folder.path().join(db));
+        assert_eq!(code, Some(0), "{replayed}");
+        let plants = replayed["plants"].as_array().unwrap().clone();
+        plants.iter().map(|plant| plant["traits"]["height"]["value"].as_f64().unwrap()).collect::<Vec<_>>()
+    };
+    let (straight, bent) = (heights(&fixture(), "straight.sqlite"), heights(&session, "bent.sqlite"));
+    assert_eq!(straight.len(), bent.len());
+    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+    // Resampled twice and seen through a narrower window, pictures are not the same to the network.
+    assert!((mean(&bent) / mean(&straight) - 1.0).abs() < 0.1, "{bent:?}, without the lens {straight:?}");
+    // The calibration is kept beside the plants.
+    let kept: String = Connection::open(folder.path().join("bent.sqlite"))
+        .unwrap()
+        .query_row("SELECT calibration FROM cameras", [], |row| row.get(0))
+        .unwrap();
+    assert_eq!(serde_json::from_str::<SessionCamera>(&kept).unwrap(), manifest.cameras[0]);
 }
 
 #[test]

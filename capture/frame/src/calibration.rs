@@ -73,6 +73,16 @@ impl Calibration {
         Ok(calibration)
     }
 
+    /// The same, for pictures of `width` x `height` pixels.
+    ///
+    /// # Errors
+    /// [`CameraError::Size`] when it is for others.
+    pub fn sized(self, width: u32, height: u32) -> Result<Self, CameraError> {
+        let k = &self.intrinsics;
+        let found = [k.width, k.height];
+        if found == [width, height] { Ok(self) } else { Err(CameraError::Size { expected: [width, height], found }) }
+    }
+
     /// The camera without its lens.
     #[must_use]
     pub fn intrinsics(&self) -> &Intrinsics {

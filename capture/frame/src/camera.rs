@@ -16,6 +16,17 @@ pub enum CameraError {
         /// What was given.
         found: f64,
     },
+    /// A calibration that was made for another picture size.
+    #[error(
+        "expected a calibration for pictures of {}x{} pixels, found one for {}x{}",
+        expected[0], expected[1], found[0], found[1]
+    )]
+    Size {
+        /// The pictures' width and height, pixels.
+        expected: [u32; 2],
+        /// The calibration's.
+        found: [u32; 2],
+    },
 }
 
 /// Pinhole intrinsics in pixels; the centre of the top-left pixel is (0.5, 0.5).

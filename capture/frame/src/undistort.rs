@@ -1,6 +1,6 @@
 use glam::DVec2;
 
-use crate::{Calibration, Intrinsics, Rgb};
+use crate::{Calibration, CameraError, Intrinsics, Rgb};
 
 /// Marks a pixel that the lens did not see.
 const UNSEEN: u32 = u32::MAX;
@@ -44,12 +44,14 @@ impl Undistort {
         &self.pinhole
     }
 
-    /// The undistorted picture, black where the lens saw nothing; `None` for a picture of another size than the camera's.
-    #[must_use]
-    pub fn picture(&self, bent: &Rgb) -> Option<Rgb> {
+    /// The undistorted picture, black where the lens saw nothing.
+    ///
+    /// # Errors
+    /// [`CameraError::Size`] for a picture of another size than the camera's.
+    pub fn picture(&self, bent: &Rgb) -> Result<Rgb, CameraError> {
         let Intrinsics { width, height, .. } = self.pinhole;
         if bent.dimensions() != (width, height) {
-            return None;
+            return Err(CameraError::Size { expected: bent.dimensions().into(), found: [width, height] });
         }
         let (from, row) = (bent.as_raw(), 3 * width as usize);
         let mut straight = Rgb::new(width, height);
@@ -67,7 +69,7 @@ impl Undistort {
                 to[c] = ((sum + PARTS * PARTS / 2) / (PARTS * PARTS)) as u8;
             }
         }
-        Some(straight)
+        Ok(straight)
     }
 }
 

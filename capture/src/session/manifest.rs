@@ -1,4 +1,4 @@
-use demeter_frame::{CameraError, CameraId, Intrinsics, Pose};
+use demeter_frame::{Calibration, CameraError, CameraId, Distortion, Intrinsics, Pose};
 use serde::{Deserialize, Serialize};
 
 /// The version of the session format this program writes, and the newest it reads.
@@ -38,8 +38,11 @@ pub struct SessionCamera {
     /// Height of its optical centre above the ground, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_above_ground_m: Option<f64>,
-    /// Its pinhole calibration.
+    /// Its calibration but for the lens.
     pub intrinsics: Intrinsics,
+    /// How its lens bends the picture; absent for a pinhole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Distortion>,
     /// Where it is mounted on the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig_from_camera: Option<Pose>,
@@ -162,10 +165,17 @@ impl Manifest {
 }
 
 impl SessionCamera {
+    /// The camera with its lens.
+    ///
+    /// # Errors
+    /// [`CameraError`] naming the number that no camera has.
+    pub fn calibration(&self) -> Result<Calibration, CameraError> {
+        Calibration::new(self.intrinsics, self.distortion)
+    }
+
     fn check(&self, key: &str) -> Result<(), ManifestError> {
         check_id(&format!("{key}.id"), &self.id.0)?;
-        let intrinsics = self.intrinsics.validated();
-        intrinsics.map_err(|source| ManifestError::Camera { key: key.to_owned(), source })?;
+        self.calibration().map_err(|source| ManifestError::Camera { key: key.to_owned(), source })?;
         if self.rig_from_camera.is_none() && self.height_above_ground_m.is_none() {
             return Err(value(key, "rig_from_camera or height_above_ground_m", "neither"));
         }

@@ -58,6 +58,7 @@ pub(crate) fn manifest() -> Manifest {
         id: CameraId(id.into()),
         height_above_ground_m: Some(1.2),
         intrinsics: Intrinsics::from_hfov(WIDTH, HEIGHT, 1.0),
+        distortion: None,
         rig_from_camera: Some(Pose::IDENTITY),
     };
     Manifest {

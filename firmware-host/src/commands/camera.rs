@@ -5,6 +5,7 @@ use clap::Subcommand;
 use crate::error::{CommandError, Exit};
 use crate::output::Output;
 
+mod calibrate;
 mod list;
 mod pick;
 mod preview;
@@ -19,6 +20,8 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum What {
+    /// The calibration of a camera out of pictures of a checkerboard.
+    Calibrate(calibrate::Args),
     /// The cameras that are plugged in, where, and what they offer.
     List,
     /// One picture of a camera, to see where it looks.
@@ -33,6 +36,7 @@ enum What {
 /// [`CommandError`] naming the camera or the file.
 pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     match &args.what {
+        What::Calibrate(args) => calibrate::run(args, output),
         What::List => list::run(output),
         What::Preview(args) => preview::run(args, output),
         What::Record(args) => record::run(args, output),

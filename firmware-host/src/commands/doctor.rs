@@ -14,6 +14,7 @@ use crate::files;
 use crate::output::Output;
 use crate::store::{Reader, StoreError};
 
+mod lenses;
 mod position;
 
 /// Free bytes below which the disk is said to be full: a guess at a day of plants with their pictures.
@@ -74,6 +75,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let store = args.db.clone().or(config.as_ref().ok().map(|config| config.store.path.clone()));
     let models = config.as_ref().map_or_else(|_| ModelsConfig::default(), |config| config.models.clone());
     let receiver = config.as_ref().map_or_else(|_| PositionConfig::default(), |config| config.position.clone());
+    let cameras = config.as_ref().map_or_else(|_| Vec::new(), |config| config.cameras.clone());
     let config =
         config.map_err(|error| Trouble::new(&error, "correct the line, or remove it: every key has a default"));
     let mut checks = vec![Check::new("configuration", config.map(|config| format!("page on {}", config.api.listen)))];
@@ -88,6 +90,9 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     checks.push(Check::new("ONNX Runtime", library.map_err(|error| Trouble::new(&error, mend))));
     checks.extend(networks);
     checks.push(Check::new("species", check_species()));
+    if !cameras.is_empty() {
+        checks.push(Check::new("lenses", lenses::check(&cameras)));
+    }
     checks.push(Check::new("position", position::check(&receiver)));
 
     if output.json {

@@ -33,7 +33,8 @@ pub struct Args {
     /// The species it shows.
     #[arg(long, default_value = "soybean")]
     species: String,
-    /// The camera's intrinsics: a JSON file with width, height, fx, fy, cx, cy in pixels.
+    /// The camera's calibration: Kalibr's camchain (one camera of several as FILE#cam1), ROS' camera_info, OpenCV's YAML, or
+    /// JSON with width, height, fx, fy, cx, cy in pixels. The photo of a lens that bends is straightened first.
     #[arg(long, conflicts_with = "hfov")]
     calibration: Option<PathBuf>,
     /// The camera's horizontal field of view, degrees.
@@ -62,8 +63,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let species = files::species(&args.species)?;
     let bytes = files::read(&args.image)?;
     let photo = decode_photo(&bytes).map_err(|error| CommandError::failed("bad_image", &error))?;
-    let (photo, turned) = lens::upright(photo, &bytes);
-    let told = lens::of(&photo, &bytes, turned, args.calibration.as_deref(), args.hfov)?;
+    let (photo, told) = lens::of(photo, &bytes, args.calibration.as_deref(), args.hfov)?;
 
     let config = Config::load(args.config.as_deref())?;
     let mut eye = Eye::open(&config.models, NonZeroUsize::MIN).and_then(Eye::closer)?;

@@ -70,7 +70,9 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     bar.finish_and_clear();
     let outcome = outcome.map_err(|error| match error {
         pipeline::PipelineError::Store(error) => error.into(),
-        error @ pipeline::PipelineError::Panicked { .. } => CommandError::failed("bug", &error),
+        error @ (pipeline::PipelineError::Panicked { .. } | pipeline::PipelineError::Camera(_)) => {
+            CommandError::failed("bug", &error)
+        }
     })?;
     let exit = if outcome.is_partial() { Exit::Partial } else { Exit::Done };
     let losses = losses(&outcome);

@@ -103,7 +103,7 @@ impl Line {
         match outcome {
             Ok(outcome) => Ok(outcome.ended.map_or(Activity::Finished, Activity::Failed)),
             Err(PipelineError::Store(error)) => Err(End::Store(error)),
-            Err(error @ PipelineError::Panicked { .. }) => Err(bug(&error)),
+            Err(error @ (PipelineError::Panicked { .. } | PipelineError::Camera(_))) => Err(bug(&error)),
         }
     }
 
@@ -119,11 +119,11 @@ impl Line {
         speed: Speed,
         control: &Control,
     ) -> Result<(Box<dyn Source>, Manifest), CommandError> {
-        let settings: Vec<_> = self.cameras.iter().map(|camera| camera.settings(speed)).collect();
+        let settings: Vec<_> = self.cameras.iter().map(|camera| camera.settings(speed)).collect::<Result<_, _>>()?;
         let cameras =
             Cameras::open(&settings, &control.positions()).map_err(|error| CommandError::failed("camera", &error))?;
         control.show_cameras(cameras.health());
-        Ok((Box::new(cameras), camera::manifest(&self.cameras, sown, &self.rig, &self.session_id())))
+        Ok((Box::new(cameras), camera::manifest(&self.cameras, sown, &self.rig, &self.session_id())?))
     }
 
     fn synthetic(&self, name: &str, plants: u16, seed: u64) -> Result<(Box<dyn Source>, Manifest), CommandError> {

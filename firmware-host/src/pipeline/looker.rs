@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::SyncSender;
 use std::time::Instant;
 
-use demeter_frame::{CameraId, Frame, Pose, Rgb, Stamp};
+use demeter_frame::{CameraError, CameraId, Frame, Pose, Rgb, Stamp, Undistort};
 use demeter_recon::organs::{OrganCloud, ScaleSource};
 use demeter_recon::view::{Closed, Gate, Observation, Quality, Tracker};
 use glam::DVec2;
@@ -51,12 +51,21 @@ pub(super) struct Looker<'a> {
     eye: &'a mut Eye,
     tracker: Tracker<FrameKey, BestView>,
     odometer: Odometer,
+    /// Cameras whose pictures are straightened before anything is measured in them.
+    lenses: BTreeMap<CameraId, Undistort>,
 }
 
 impl<'a> Looker<'a> {
-    pub(super) fn new(run: &'a Run<'a>, eye: &'a mut Eye) -> Self {
+    pub(super) fn new(run: &'a Run<'a>, eye: &'a mut Eye) -> Result<Self, CameraError> {
         let spacing = run.manifest.rows.iter().filter_map(|row| row.plant_spacing_m).reduce(f64::min);
-        Self { run, eye, tracker: Tracker::new(Gate::of_spacing(spacing)), odometer: Odometer::default() }
+        let mut lenses = BTreeMap::new();
+        for camera in &run.manifest.cameras {
+            if let Some(lens) = Undistort::of(&camera.calibration()?) {
+                lenses.insert(camera.id.clone(), lens);
+            }
+        }
+        let tracker = Tracker::new(Gate::of_spacing(spacing));
+        Ok(Self { run, eye, tracker, odometer: Odometer::default(), lenses })
     }
 
     /// Works until no more frames come or nobody listens. A recording that was stopped leaves the plants in view out:
@@ -100,7 +109,16 @@ impl<'a> Looker<'a> {
             return unseen("no_pose", "the session has no pose for the frame, so its plants have no place".into());
         };
         let started = Instant::now();
-        let sight = match self.eye.look(rgb, &camera.intrinsics, Some(pose)) {
+        let straight;
+        let (rgb, intrinsics) = match self.lenses.get(&frame.camera).map(|lens| (lens.picture(rgb), lens.pinhole())) {
+            None => (rgb, &camera.intrinsics),
+            Some((Ok(picture), pinhole)) => {
+                straight = picture;
+                (&straight, pinhole)
+            }
+            Some((Err(error), _)) => return unseen("picture_size", error.to_string()),
+        };
+        let sight = match self.eye.look(rgb, intrinsics, Some(pose)) {
             Ok(sight) => sight,
             Err(error) => return unseen(error.name(), chain(&error)),
         };
@@ -109,7 +127,7 @@ impl<'a> Looker<'a> {
             tracing::warn!("frame {}: {degraded}", frame.seq);
         }
         let travelled = self.odometer.advance(&frame.camera, pose.translation.truncate());
-        let seen = observations(sight, frame, rgb, &camera.intrinsics, pose, self.odometer.forward(&frame.camera));
+        let seen = observations(sight, frame, rgb, intrinsics, pose, self.odometer.forward(&frame.camera));
         let (closed, misplaced) = self.tracker.frame(&key, travelled, seen);
         let mut found = vec![Found::Seen { milliseconds: started.elapsed().as_secs_f64() * 1e3 }];
         if !misplaced.is_empty() {

@@ -23,6 +23,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
 use demeter_capture::{Counts, Manifest, Source};
+use demeter_frame::CameraError;
 use demeter_recon::model::Species;
 use serde::Serialize;
 
@@ -98,6 +99,9 @@ pub enum PipelineError {
     /// The store failed: nothing may be acknowledged any more.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// A session's camera is none; manifests that were read have been checked for that.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
     /// A stage's thread died, which is a bug.
     #[error("the {stage} stage panicked")]
     Panicked {
@@ -121,11 +125,12 @@ pub fn run(
     let provenance = keep::provenance(eye);
     let models = eye.models().into_iter().map(|(_, sha256)| sha256.to_owned()).collect();
     let mut keeper = keep::Keeper { run, provenance, models, outcome: Outcome::default() };
+    let looker = looker::Looker::new(run, eye)?;
     let joined = std::thread::scope(|scope| {
         let (to_looker, frames) = tokio::sync::mpsc::channel(FRAMES_WAITING);
         let (to_keeper, sights) = sync_channel(PLANTS_WAITING);
         let reader = scope.spawn(move || reader::read(run, source, &to_looker));
-        let looker = scope.spawn(move || looker::Looker::new(run, eye).look(frames, &to_keeper));
+        let looker = scope.spawn(move || looker.look(frames, &to_keeper));
         let kept = sights.into_iter().try_for_each(|found| keeper.take(found, &mut progress));
         // With the receiver gone the stages before end at their next send.
         let counts = reader.join().map_err(|_panic| PipelineError::Panicked { stage: "reader" });

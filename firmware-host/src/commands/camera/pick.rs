@@ -6,6 +6,9 @@ use demeter_frame::PixelFormat;
 use crate::config::{CameraConfig, Config, PositionConfig};
 use crate::error::CommandError;
 
+/// Horizontal field of view of a camera of which nothing is told, degrees: many a webcam's (a guess).
+const HFOV_DEG: f64 = 60.0;
+
 /// Which cameras a command takes: those of the configuration, or one that is described by options.
 #[derive(Debug, clap::Args)]
 pub(super) struct Pick {
@@ -31,9 +34,12 @@ pub(super) struct Pick {
     /// Frames a second.
     #[arg(long, default_value_t = 15.0)]
     rate: f64,
-    /// Horizontal field of view, degrees.
-    #[arg(long, default_value_t = 60.0)]
-    hfov: f64,
+    /// Horizontal field of view, degrees; 60 where there is no calibration either.
+    #[arg(long)]
+    hfov: Option<f64>,
+    /// The camera's calibration, as for `demeter photo`.
+    #[arg(long, conflicts_with = "hfov")]
+    calibration: Option<PathBuf>,
     /// Height of the lens above the ground, metres.
     #[arg(long, default_value_t = 1.0)]
     height: f64,
@@ -74,7 +80,9 @@ impl Pick {
             height,
             rate: self.rate,
             tilt_deg: self.tilt,
-            ..CameraConfig::new(&self.id, &device, self.hfov, self.height)
+            hfov_deg: self.hfov.or(self.calibration.is_none().then_some(HFOV_DEG)),
+            calibration: self.calibration.clone(),
+            ..CameraConfig::new(&self.id, &device, self.height)
         };
         camera.check().map_err(|(key, expected, found)| {
             let key = key.trim_start_matches("cameras.");

@@ -39,7 +39,7 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     };
     let mut cameras = args.pick.cameras()?;
     cameras.truncate(1);
-    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(Speed::Given(0.0))).collect();
+    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(Speed::Given(0.0))).collect::<Result<_, _>>()?;
     let mut source =
         Cameras::open(&settings, &Positions::default()).map_err(|error| CommandError::failed("camera", &error))?;
     let frame = settled(&mut source)?;

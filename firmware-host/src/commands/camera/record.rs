@@ -71,13 +71,13 @@ pub(super) fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
         CommandError::usage("usage", "expected --speed, or a receiver in the configuration's [position], found neither")
     })?;
     let sown = Sown { species: &args.species, spacing: args.spacing, arm: position.arm() };
-    let manifest = manifest(&cameras, sown, &args.rig, &session);
+    let manifest = manifest(&cameras, sown, &args.rig, &session)?;
     let mut recorder = Recorder::create(&args.output, manifest).map_err(|error| failed(&error))?;
     let stop = interrupted()?;
     let receiver = position.receiver().map(Receiver::open).transpose();
     let receiver = receiver.map_err(|error| CommandError::failed("position", &error))?;
     let positions = receiver.as_ref().map(Receiver::positions).unwrap_or_default();
-    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(speed)).collect();
+    let settings: Vec<_> = cameras.iter().map(|camera| camera.settings(speed)).collect::<Result<_, _>>()?;
     let mut source = Cameras::open(&settings, &positions).map_err(|error| CommandError::failed("camera", &error))?;
     let health = source.health();
     let bar = args.frames.map_or_else(ProgressBar::no_length, ProgressBar::new);

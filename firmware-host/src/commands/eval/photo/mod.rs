@@ -110,8 +110,8 @@ impl Run<'_> {
     fn read(eye: &mut Eye, path: &Path) -> Result<Photo, CommandError> {
         let bytes = files::read(path)?;
         let photo = decode_photo(&bytes).map_err(|error| CommandError::failed("bad_image", &error).of(path))?;
-        let (rgb, turned) = lens::upright(photo, &bytes);
-        let camera = match lens::of(&rgb, &bytes, turned, None, None)? {
+        let (rgb, told) = lens::of(photo, &bytes, None, None)?;
+        let camera = match told {
             Some(lens) => lens.camera,
             None => {
                 let maps = eye.maps(&rgb).map_err(|error| CommandError::failed(error.name(), &error).of(path))?;
