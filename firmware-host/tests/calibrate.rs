@@ -99,7 +99,7 @@ fn bend(picture: &Rgb) -> f64 {
         let across = (b - a).normalize().perp();
         on.iter().map(|p| across.dot(*p - a).abs()).fold(0.0, f64::max)
     };
-    (0..8).map(|n| line(&|p| side(p.x), n).max(line(&|p| side(p.y), n))).fold(0.0, f64::max)
+    (0..8).map(|n| line(&|p: DVec2| side(p.x), n).max(line(&|p: DVec2| side(p.y), n))).fold(0.0, f64::max)
 }
 
 #[test]

@@ -104,11 +104,11 @@ impl Calibration {
         let Some(lens) = &self.distortion else {
             return k.project(x_in_camera).ok_or(OutOfView::Behind { found: x_in_camera.z });
         };
-        if !(x_in_camera.z > 1e-9) {
+        if x_in_camera.z.is_nan() || x_in_camera.z <= 1e-9 {
             return Err(OutOfView::Behind { found: x_in_camera.z });
         }
         let p = x_in_camera.truncate() / x_in_camera.z;
-        if !(p.length() <= self.reach) {
+        if p.is_nan() || p.length() > self.reach {
             let degrees = |radius: f64| radius.atan().to_degrees();
             return Err(OutOfView::Beyond { expected: degrees(self.reach), found: degrees(p.length()) });
         }

@@ -107,9 +107,8 @@ impl Distortion {
         /// Steps from the axis outwards: a fold narrower than one of them is passed over, and bends by less than a pixel.
         const STEPS: u32 = 512;
         let radius = |step: u32| farthest * f64::from(step) / f64::from(STEPS);
-        // A slope that is no number is none that grows.
-        let folds = |step: &u32| !(self.radius(radius(*step)).1 > 0.0);
-        (1..=STEPS).find(folds).map_or(farthest, |step| radius(step - 1))
+        let grows = |step: &u32| self.radius(radius(*step)).1 > 0.0;
+        (1..=STEPS).take_while(grows).last().map_or(0.0, radius)
     }
 
     /// The direction within `reach` of the axis that is bent to `bent`: the inverse of [`Self::bend`], by Newton's method.

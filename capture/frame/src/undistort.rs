@@ -63,10 +63,10 @@ impl Undistort {
             // Two pixels of this row and the two below them.
             let (above, below) = (&from[first..first + 6], &from[first + row..first + row + 6]);
             let (right, down) = (u32::from(tap.right), u32::from(tap.down));
-            for c in 0..3 {
+            for (c, value) in to.iter_mut().enumerate() {
                 let across = |pair: &[u8]| u32::from(pair[c]) * (PARTS - right) + u32::from(pair[c + 3]) * right;
                 let sum = across(above) * (PARTS - down) + across(below) * down;
-                to[c] = ((sum + PARTS * PARTS / 2) / (PARTS * PARTS)) as u8;
+                *value = ((sum + PARTS * PARTS / 2) / (PARTS * PARTS)) as u8;
             }
         }
         Ok(straight)

@@ -160,8 +160,7 @@ fn finished(
     let deviations: [f64; LENS] = variance.map(f64::sqrt).into();
     let [fx, fy, cx, cy, coefficients @ ..] = <[f64; LENS]>::from(guess.lens);
     let loose = (deviations[0] / fx).max(deviations[1] / fy);
-    // What is no number is not sure either.
-    if !(loose <= LOOSEST) {
+    if loose.is_nan() || loose > LOOSEST {
         return Err(CalibrateError::Loose { expected: 100.0 * LOOSEST, found: 100.0 * loose });
     }
     let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
