@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::LazyLock;
 
 use demeter::board::Board;
 use demeter::files;
@@ -34,29 +35,36 @@ const HELD: [Held; 10] = [
     ([0.0, 0.0, 0.42], [0.5, 0.5, 0.8]),
 ];
 
-/// A photo through the true lens: three by three rays a pixel, blurred, noisy. `seen` is the share of the board, from its
+/// Three by three rays a pixel through the true lens, row by row of the finer picture.
+static RAYS: LazyLock<Vec<DVec2>> = LazyLock::new(|| {
+    let camera = truth();
+    let ray = |i: u32| {
+        let (x, y) = (f64::from(i % (3 * 640)) + 0.5, f64::from(i / (3 * 640)) + 0.5);
+        camera.unproject(DVec2::new(x, y) / 3.0, 1.0).unwrap().truncate()
+    };
+    (0..9 * 640 * 480).map(ray).collect()
+});
+
+/// A photo through the true lens, blurred, noisy. `seen` is the share of the board, from its
 /// left, that nothing stands before.
 fn photo(board: &Board, (middle, [x, y, z]): &Held, seen: f64) -> Rgb {
     let turn = DQuat::from_rotation_x(*x) * DQuat::from_rotation_y(*y) * DQuat::from_rotation_z(*z);
     let board_from_camera = Pose::new(turn, DVec3::from(*middle)).inverse();
-    let camera = truth();
     let half = DVec2::new(f64::from(board.squares[0]), f64::from(board.squares[1])) / 2.0;
-    let shade = |at: DVec2| {
-        let ray = board_from_camera.rotation * camera.unproject(at, 1.0).unwrap();
+    let shade = |[x, y]: [u32; 2]| {
+        let ray = board_from_camera.rotation * RAYS[(y * 3 * 640 + x) as usize].extend(1.0);
         let eye = board_from_camera.translation;
         let on = (eye - ray * (eye.z / ray.z)).truncate() / board.side + half;
         let rim = on.min(2.0 * half - on).min_element();
         if rim < -1.0 || on.x > 2.0 * half.x * seen {
             // A wall with a slow pattern.
-            return 110.0 + 20.0 * (at.x / 37.0).sin() * (at.y / 23.0).cos();
+            return 110.0 + 20.0 * (f64::from(x) / 111.0).sin() * (f64::from(y) / 69.0).cos();
         }
         let black = rim > 0.0 && (on.x.floor() + on.y.floor()).rem_euclid(2.0) == 0.0;
         if black { 35.0 } else { 215.0 }
     };
-    let thirds = [1.0 / 6.0, 0.5, 5.0 / 6.0];
     let sharp = Rgb::from_fn(640, 480, |x, y| {
-        let rays =
-            thirds.iter().flat_map(|v| thirds.iter().map(move |u| DVec2::new(f64::from(x) + u, f64::from(y) + v)));
+        let rays = (0..9).map(|i| [3 * x + i % 3, 3 * y + i / 3]);
         image::Rgb([(rays.map(shade).sum::<f64>() / 9.0) as u8; 3])
     });
     let mut noise = fastrand::Rng::with_seed(9);

@@ -6,15 +6,12 @@ use serde::Deserialize;
 
 use super::{CalibrationError, HALF_PIXEL, distortion, value, yaml};
 
+/// As a file: matrices say their size.
 #[derive(Deserialize)]
-struct CameraInfo {
-    #[serde(alias = "width")]
+struct File {
     image_width: u32,
-    #[serde(alias = "height")]
     image_height: u32,
-    #[serde(alias = "K", alias = "k")]
     camera_matrix: Matrix,
-    #[serde(alias = "D", alias = "d")]
     distortion_coefficients: Matrix,
     #[serde(default)]
     distortion_model: Option<String>,
@@ -22,43 +19,59 @@ struct CameraInfo {
     fisheye_model: u8,
 }
 
-/// A matrix by rows, or the numbers alone as in the message.
 #[derive(Deserialize)]
-#[serde(untagged)]
-enum Matrix {
-    Sized { rows: usize, cols: usize, data: Vec<f64> },
-    Bare(Vec<f64>),
+struct Matrix {
+    rows: usize,
+    cols: usize,
+    data: Vec<f64>,
 }
 
 impl Matrix {
-    fn data(&self, key: &str) -> Result<&[f64], CalibrationError> {
-        match self {
-            Self::Sized { rows, cols, data } if rows.checked_mul(*cols) != Some(data.len()) => {
-                let found = format!("{rows} x {cols} with {} numbers", data.len());
-                Err(value(key, "rows times cols numbers", found))
-            }
-            Self::Sized { data, .. } | Self::Bare(data) => Ok(data),
+    fn data(self, key: &str) -> Result<Vec<f64>, CalibrationError> {
+        let Self { rows, cols, data } = self;
+        if rows.checked_mul(cols) != Some(data.len()) {
+            let found = format!("{rows} x {cols} with {} numbers", data.len());
+            return Err(value(key, "rows times cols numbers", found));
         }
+        Ok(data)
     }
 }
 
-pub(super) fn read(text: &str) -> Result<Calibration, CalibrationError> {
-    let info = yaml::<CameraInfo>(text)?;
-    let matrix = info.camera_matrix.data("camera_matrix")?;
-    let &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] = matrix else {
-        let expected = "nine numbers: fx, 0, cx, 0, fy, cy, 0, 0, 1";
-        return Err(value("camera_matrix", expected, format!("{matrix:?}")));
-    };
-    let model = match (info.distortion_model.as_deref(), info.fisheye_model) {
+/// As the message is printed.
+#[derive(Deserialize)]
+struct Message {
+    width: u32,
+    height: u32,
+    #[serde(alias = "K")]
+    k: Vec<f64>,
+    #[serde(alias = "D")]
+    d: Vec<f64>,
+    distortion_model: String,
+}
+
+pub(super) fn read_file(text: &str) -> Result<Calibration, CalibrationError> {
+    let file = yaml::<File>(text)?;
+    let (matrix, lens) = ("camera_matrix", "distortion_coefficients");
+    let model = match (file.distortion_model.as_deref(), file.fisheye_model) {
         (Some(model), _) => model,
         (None, 0) => "plumb_bob",
         (None, _) => "equidistant",
     };
-    let key = "distortion_coefficients";
-    let lens = distortion(key, model, info.distortion_coefficients.data(key)?)?;
-    let (width, height) = (info.image_width, info.image_height);
-    let (cx, cy) = (cx + HALF_PIXEL, cy + HALF_PIXEL);
-    Ok(Calibration::new(Intrinsics { width, height, fx, fy, cx, cy }, lens)?)
+    let k = intrinsics(matrix, file.image_width, file.image_height, &file.camera_matrix.data(matrix)?)?;
+    Ok(Calibration::new(k, distortion(lens, model, &file.distortion_coefficients.data(lens)?)?)?)
+}
+
+pub(super) fn read_message(text: &str) -> Result<Calibration, CalibrationError> {
+    let message = yaml::<Message>(text)?;
+    let k = intrinsics("k", message.width, message.height, &message.k)?;
+    Ok(Calibration::new(k, distortion("d", &message.distortion_model, &message.d)?)?)
+}
+
+fn intrinsics(key: &str, width: u32, height: u32, matrix: &[f64]) -> Result<Intrinsics, CalibrationError> {
+    let &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] = matrix else {
+        return Err(value(key, "nine numbers: fx, 0, cx, 0, fy, cy, 0, 0, 1", format!("{matrix:?}")));
+    };
+    Ok(Intrinsics { width, height, fx, fy, cx: cx + HALF_PIXEL, cy: cy + HALF_PIXEL })
 }
 
 /// The text of ROS' camera_info for a camera of that name (see [`crate::is_id`]); its projection matrix is that of the

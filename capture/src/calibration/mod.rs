@@ -78,8 +78,10 @@ pub fn parse_calibration(bytes: &[u8], camera: Option<&str>) -> Result<Calibrati
     let has = |known: &[&str]| keys.iter().any(|key| known.contains(&key.as_str()));
     if keys.iter().any(|key| kalibr::is_camera(key)) {
         kalibr::read(text, camera)
-    } else if has(&["camera_matrix", "K", "k"]) {
-        camera_info::read(text)
+    } else if has(&["camera_matrix"]) {
+        camera_info::read_file(text)
+    } else if has(&["K", "k"]) {
+        camera_info::read_message(text)
     } else if has(&["fx"]) {
         Ok(Calibration::new(yaml::<Intrinsics>(text)?, None)?)
     } else {
