@@ -153,8 +153,8 @@ impl Calibration {
             let outwards = || (DVec2::new(x - k.cx, y - k.cy) * 1e6).clamp_length_max(farthest);
             seen.unwrap_or_else(|_unreached| outwards()).clamp_length_max(farthest)
         };
-        let rows = (0..=k.height).map(|y| f64::from(y)).map(|y| (edge(0.0, y).x, edge(width, y).x));
-        let columns = (0..=k.width).map(|x| f64::from(x)).map(|x| (edge(x, 0.0).y, edge(x, height).y));
+        let rows = (0..=k.height).map(f64::from).map(|y| (edge(0.0, y).x, edge(width, y).x));
+        let columns = (0..=k.width).map(f64::from).map(|x| (edge(x, 0.0).y, edge(x, height).y));
         let within = |(low, high): (f64, f64), (a, b): (f64, f64)| (low.max(a), high.min(b));
         let all = (f64::NEG_INFINITY, f64::INFINITY);
         let ((x0, x1), (y0, y1)) = (rows.fold(all, within), columns.fold(all, within));

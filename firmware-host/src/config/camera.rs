@@ -231,7 +231,7 @@ mod tests {
         let plain = CameraConfig { hfov_deg: Some(60.0), ..CameraConfig::new("left", "usb-1", 1.0) };
         let camera = CameraConfig { calibration: Some(file.path().into()), ..plain.clone() };
         let sown = Sown { species: "soybean", spacing: None, arm: None };
-        let session = manifest(&[camera.clone()], sown, "rig", "session").unwrap();
+        let session = manifest(std::slice::from_ref(&camera), sown, "rig", "session").unwrap();
         assert_eq!((session.cameras[0].intrinsics, session.cameras[0].distortion), (k, Some(lens)));
         // As a session's file it is the same again.
         assert_eq!(Manifest::parse(session.to_toml().unwrap().as_bytes()).unwrap(), session);
