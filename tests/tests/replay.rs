@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use demeter_capture::{Manifest, Pace, Recorder, Replay, SessionCamera, Source, decode};
-use demeter_frame::{Distortion, Frame, Rgb};
+use demeter_frame::{Calibration, Distortion, Frame, Rgb};
 use demeter_tests::{answer, demeter, root};
 use glam::DVec2;
 use image::codecs::jpeg::JpegEncoder;
@@ -61,44 +61,51 @@ fn the_bundled_session_becomes_its_plants_and_two_replays_agree_to_the_byte() {
     }
 }
 
-/// The bundled session as a camera would have seen it whose lens bends pictures outwards.
-fn bent(folder: &Path) -> Manifest {
+/// The bundled session as another camera would have seen it from the same places.
+fn seen_by(camera: &Calibration, folder: &Path) -> Manifest {
     let mut source = Replay::open(&fixture(), Pace::Max).unwrap();
     let mut manifest = source.manifest().clone();
     let pinhole = manifest.cameras[0].intrinsics;
-    manifest.cameras[0].distortion = Some(Distortion::PlumbBob { coefficients: [0.5, 0.1, 2e-3, -2e-3, 0.0] });
-    let camera = manifest.cameras[0].calibration().unwrap();
+    manifest.cameras[0].intrinsics = *camera.intrinsics();
+    manifest.cameras[0].distortion = camera.distortion().copied();
     let mut recorder = Recorder::create(folder, manifest.clone()).unwrap();
     while let Some(frame) = source.next().unwrap() {
-        let straight = decode(&frame).unwrap();
-        let bent = Rgb::from_fn(pinhole.width, pinhole.height, |x, y| {
+        let before = decode(&frame).unwrap();
+        let seen = Rgb::from_fn(pinhole.width, pinhole.height, |x, y| {
             let ray = camera.unproject(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), 1.0).unwrap();
             let at = pinhole.project(ray).unwrap() - 0.5;
-            interpolate_bilinear(&straight, at.x as f32, at.y as f32).unwrap_or(image::Rgb([0; 3]))
+            interpolate_bilinear(&before, at.x as f32, at.y as f32).unwrap_or(image::Rgb([0; 3]))
         });
         let mut bytes = Vec::new();
-        JpegEncoder::new_with_quality(&mut bytes, 95).encode_image(&bent).unwrap();
+        JpegEncoder::new_with_quality(&mut bytes, 95).encode_image(&seen).unwrap();
         recorder.write(&Frame { bytes: bytes.into(), ..frame }).unwrap();
     }
     recorder.finish().unwrap();
     manifest
 }
 
+/// A lens that bends pictures outwards, against the pinhole that sees the same part of the world.
 #[test]
 fn what_a_lens_bends_is_measured_as_if_it_did_not() {
     let folder = tempfile::tempdir().unwrap();
-    let session = folder.path().join("bent");
-    let manifest = bent(&session);
+    let pinhole = Replay::open(&fixture(), Pace::Max).unwrap().manifest().cameras[0].intrinsics;
+    let lens = Distortion::PlumbBob { coefficients: [0.5, 0.1, 2e-3, -2e-3, 0.0] };
+    let bent = Calibration::new(pinhole, Some(lens)).unwrap();
+    let straight = Calibration::new(bent.pinhole(), None).unwrap();
+    let sessions = ["bent", "straight"].map(|name| folder.path().join(name));
+    let manifest = seen_by(&bent, &sessions[0]);
+    seen_by(&straight, &sessions[1]);
     let heights = |session: &Path, db: &str| {
         let (code, replayed) = replay(session, &folder.path().join(db));
         assert_eq!(code, Some(0), "{replayed}");
         let plants = replayed["plants"].as_array().unwrap().clone();
         plants.iter().map(|plant| plant["traits"]["height"]["value"].as_f64().unwrap()).collect::<Vec<_>>()
     };
-    let (straight, bent) = (heights(&fixture(), "straight.sqlite"), heights(&session, "bent.sqlite"));
+    let bent = heights(&sessions[0], "bent.sqlite");
+    let straight = heights(&sessions[1], "straight.sqlite");
     assert_eq!(straight.len(), bent.len());
     let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
-    // Resampled twice and seen through a narrower window, pictures are not the same to the network.
+    // Resampled once more, pictures are not quite the same to the network.
     assert!((mean(&bent) / mean(&straight) - 1.0).abs() < 0.1, "{bent:?}, without the lens {straight:?}");
     // The calibration is kept beside the plants.
     let kept: String = Connection::open(folder.path().join("bent.sqlite"))
