@@ -185,8 +185,8 @@ impl<'a> Builder<'a> {
     }
 
     /// Fits blades again that are hardly larger than the noise; `count` tells the points of an organ of the tree.
-    pub(super) fn sharpen(&mut self, count: &dyn Fn(usize) -> usize) {
-        let count = |fits: &[OrganFit], organ: usize| fits[organ].source.map_or(0, count);
+    pub(super) fn sharpen(&mut self, count: impl Fn(usize) -> usize) {
+        let count = |fits: &[OrganFit], organ: usize| fits[organ].source.map_or(0, &count);
         let each = |hung: &HungBlade| {
             count(&self.fits, hung.organ) as f64 / self.evidence[hung.organ].points.len().max(1) as f64
         };

@@ -70,7 +70,7 @@ pub struct Fitted {
 /// # Errors
 /// [`FitError`] when the main stem cannot be fitted, or when the tree is none.
 pub fn plant(tree: &OrganTree, species: &Species, up: DVec3) -> Result<Fitted, FitError> {
-    fitted(tree, species, up, |builder, points| builder.sharpen(points))
+    fitted(tree, species, up, true)
 }
 
 /// Fits a plant to organs lifted from one picture, in its camera's frame, and moves its blades to where the picture
@@ -85,18 +85,13 @@ pub fn in_picture(
     up: DVec3,
 ) -> Result<Fitted, FitError> {
     // A network's depth is a smooth surface: where a blade does not fit it, no scanner's noise has smeared it.
-    let mut fitted = fitted(tree, species, up, |_, _| ())?;
+    let mut fitted = fitted(tree, species, up, false)?;
     pictured::to_picture(&mut fitted, shown, species, up)?;
     Ok(fitted)
 }
 
-/// A plant whose blades are gone over again by `sharpen`, which gets the points of each organ of the tree.
-fn fitted(
-    tree: &OrganTree,
-    species: &Species,
-    up: DVec3,
-    sharpen: impl FnOnce(&mut Builder<'_>, &dyn Fn(usize) -> usize),
-) -> Result<Fitted, FitError> {
+/// A plant of points that are `scanned`, so that noise may have smeared its blades, or not.
+fn fitted(tree: &OrganTree, species: &Species, up: DVec3, scanned: bool) -> Result<Fitted, FitError> {
     check(tree)?;
     let few: Vec<Vec<DVec3>> = tree.organs.iter().map(|organ| thinned(&organ.points, MAX_POINTS)).collect();
     let source = |organ: usize| Source { organ, kind: tree.organs[organ].kind, points: &few[organ] };
@@ -117,7 +112,9 @@ fn fitted(
         }));
     }
     let counts = |organ: usize| tree.organs[organ].points.len();
-    sharpen(&mut builder, &counts);
+    if scanned {
+        builder.sharpen(counts);
+    }
     leaflets::group(&mut builder.organs, species.habit);
     builder.doubt(counts);
     let mut plant = Plant { world_from_plant, organs: builder.organs };
