@@ -34,7 +34,7 @@ pub use lift::{DropReason, Dropped, Lifted, LiftedOrgan, lift};
 pub use overlay::overlay;
 pub use patches::{Patch, patches};
 pub use scale::{DepthScale, ScaleError, ground_plane, nominal};
-pub use sharpen::sharpened;
+pub use sharpen::{excess_green, sharpened};
 pub use shown::shown;
 pub use track::{Closed, Gate, Observation, Quality, Tracker};
 

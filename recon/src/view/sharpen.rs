@@ -74,8 +74,10 @@ fn drop_grey(mask: &mut GrayImage, picture: &Rgb, plant: &Mask) {
     }
 }
 
-/// How much greener than grey a colour is, in shares of its brightness: excess green of chromaticities, -1 to 2.
-fn excess_green(colour: &image::Rgb<u8>) -> f64 {
+/// How much greener than grey a colour is, in shares of its brightness: excess green (Woebbecke et al. 1995) of
+/// chromaticities, -1 to 2.
+#[must_use]
+pub fn excess_green(colour: &image::Rgb<u8>) -> f64 {
     let [r, g, b] = colour.0.map(f64::from);
     (2.0 * g - r - b) / (r + g + b).max(1.0)
 }
