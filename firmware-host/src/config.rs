@@ -116,6 +116,16 @@ impl Default for ModelsConfig {
     }
 }
 
+impl ModelsConfig {
+    /// The same for rows: on a known ground, whose plane corrects depth, organ2d's tells the plants of a row apart better
+    /// than relief2d's (docs/training.md).
+    #[must_use]
+    pub fn in_rows(&self) -> Self {
+        let depth = if self.depth == RELIEF { OURS } else { &self.depth };
+        Self { depth: depth.into(), ..self.clone() }
+    }
+}
+
 /// `[source]`, chosen by its key `kind`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]

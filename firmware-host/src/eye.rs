@@ -100,21 +100,21 @@ pub struct Sight {
 }
 
 impl Eye {
-    /// Loads ONNX Runtime, our network and those that the configuration names beside it. One of these that is missing or
-    /// refused is left out: see [`Eye::degraded`].
+    /// Loads ONNX Runtime, our network and those that the configuration names beside it for rows. One of these that is
+    /// missing or refused is left out: see [`Eye::degraded`].
     ///
     /// # Errors
     /// [`EyeError`], whose message says how to mend it.
     pub fn open(config: &ModelsConfig, threads: NonZeroUsize) -> Result<Self, EyeError> {
-        Ok(Self { networks: Networks::open(config, threads)? })
+        Ok(Self { networks: Networks::open(&config.in_rows(), threads)? })
     }
 
-    /// The same, looking closer: [`PHOTO_SIDE`].
+    /// The same for photos, which are looked at closer: [`PHOTO_SIDE`].
     ///
     /// # Errors
-    /// [`EyeError`] when the network does not take that size.
-    pub fn closer(self) -> Result<Self, EyeError> {
-        Ok(Self { networks: self.networks.with_long_side(PHOTO_SIDE)? })
+    /// As [`Eye::open`].
+    pub fn of_photos(config: &ModelsConfig, threads: NonZeroUsize) -> Result<Self, EyeError> {
+        Ok(Self { networks: Networks::open(config, threads)?.with_long_side(PHOTO_SIDE)? })
     }
 
     /// Name and SHA-256 of each network, ours first.
@@ -176,7 +176,7 @@ impl Eye {
         let maps = if is_far { self.networks.maps_at(picture, far::LONG_SIDE)? } else { maps };
         let plants = is_far.then(|| maps.plants());
         let Scene { mut semantic, dist, log_depth, divided, metric, scale: enlargement, degraded } =
-            self.networks.scene(picture, maps, camera, world_from_camera.is_some())?;
+            self.networks.scene(picture, maps, camera)?;
         if let Some(plants) = plants {
             far::sharpen(&mut semantic, picture, &plants);
         }
@@ -212,4 +212,21 @@ fn enlarged([x0, y0, x1, y1]: [u32; 4], [sx, sy]: [f64; 2], (width, height): (u3
     let low = |v: u32, s: f64| (f64::from(v) * s).floor() as u32;
     let high = |v: u32, s: f64, most: u32| ((f64::from(v + 1) * s).ceil() as u32).min(most);
     [low(x0, sx), low(y0, sy), high(x1, sx, width), high(y1, sy, height)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a plant's provenance names is what looked at it.
+    #[test]
+    fn rows_are_looked_at_without_the_depth_of_photos_and_with_that_of_others() {
+        let config = ModelsConfig::default();
+        let rows = Eye::open(&config, NonZeroUsize::MIN).unwrap();
+        let photos = Eye::of_photos(&config, NonZeroUsize::MIN).unwrap();
+        let names = |eye: &Eye| eye.models().into_iter().map(|(name, _)| name.to_owned()).collect::<Vec<_>>();
+        assert_eq!((names(&rows), names(&photos)), (vec!["organ2d".into()], vec!["organ2d".into(), "relief2d".into()]));
+        let others = ModelsConfig { depth: "meter".into(), ..config };
+        assert_eq!(others.in_rows(), others);
+    }
 }

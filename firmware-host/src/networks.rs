@@ -113,22 +113,11 @@ impl Networks {
     }
 
     /// The scene of a picture and what ours says of it; what of the others fails is left out and said.
-    /// On a `known_ground`, whose plane corrects depth, organ2d's tells the plants of a row apart better than relief2d's
-    /// (docs/training.md).
-    pub(crate) fn scene(
-        &mut self,
-        picture: &Rgb,
-        maps: OrganMaps,
-        camera: &Intrinsics,
-        known_ground: bool,
-    ) -> Result<Scene, ViewError> {
+    pub(crate) fn scene(&mut self, picture: &Rgb, maps: OrganMaps, camera: &Intrinsics) -> Result<Scene, ViewError> {
         let semantic = maps.semantic();
         let (width, height) = semantic.dimensions();
         let mut degraded = Vec::new();
-        let idle = |network: &DepthNetwork| known_ground && matches!(network, DepthNetwork::Relief2d(_));
-        let depth = self.depth.as_mut().filter(|network| !idle(network));
-        let alone = self.mask.is_none() && self.organs.is_none() && depth.is_none();
-        let working = if alone { Cow::Borrowed(picture) } else { bounded(picture) };
+        let working = if self.models().len() > 1 { bounded(picture) } else { Cow::Borrowed(picture) };
         let mask = match &mut self.mask {
             Some(cutter) => {
                 let (raster, regions) = ours_divided(&maps, &semantic, camera)?;
@@ -137,7 +126,7 @@ impl Networks {
             None => None,
         };
         let organs = self.organs.as_mut().and_then(|network| kept("organs", network.run(&working), &mut degraded));
-        let depth = depth.and_then(|network| kept("depth", network.run(&working), &mut degraded));
+        let depth = self.depth.as_mut().and_then(|network| kept("depth", network.run(&working), &mut degraded));
 
         let mut scene = Scene {
             semantic,

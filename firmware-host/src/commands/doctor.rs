@@ -137,7 +137,7 @@ fn check_disk(store: &Path) -> Result<String, Trouble> {
 /// Ours and those that `[models]` names. Opening one verifies its file's hash, its inputs and its outputs.
 fn check_networks(config: &ModelsConfig) -> Result<String, Trouble> {
     let mend = "install the models folder beside the program, or point DEMETER_MODELS to it";
-    let eye = Eye::open(config, NonZeroUsize::MIN).map_err(|error| Trouble::new(&error, mend))?;
+    let eye = Eye::of_photos(config, NonZeroUsize::MIN).map_err(|error| Trouble::new(&error, mend))?;
     if let Some(degraded) = eye.degraded().first() {
         let mend = "`demeter models list` shows what is installed, `demeter models install` takes a file in";
         return Err(Trouble { found: degraded.to_string(), mend: mend.into() });

@@ -66,7 +66,7 @@ pub fn run(args: &Args, output: &Output) -> Result<Exit, CommandError> {
     let (photo, told) = lens::of(photo, &bytes, args.calibration.as_deref(), args.hfov)?;
 
     let config = Config::load(args.config.as_deref())?;
-    let mut eye = Eye::open(&config.models, NonZeroUsize::MIN).and_then(Eye::closer)?;
+    let mut eye = Eye::of_photos(&config.models, NonZeroUsize::MIN)?;
     let blind = |error: SightError| CommandError::failed(error.name(), &error);
     let maps = eye.maps(&photo).map_err(blind)?;
     let Lens { camera, warning } = told.unwrap_or_else(|| lens::guessed(&photo, &maps.camera));

@@ -103,7 +103,7 @@ impl Run<'_> {
     }
 
     fn eye() -> Result<Eye, CommandError> {
-        Ok(Eye::open(&ModelsConfig::default(), NonZeroUsize::MIN).and_then(Eye::closer)?)
+        Ok(Eye::of_photos(&ModelsConfig::default(), NonZeroUsize::MIN)?)
     }
 
     /// A photo as `demeter photo` reads it.
